@@ -50,6 +50,7 @@ struct WaitingMap {
   std::string name;
   bool scans = false;  // for integration
   bool jobs = false;
+  std::uint64_t edits = 0;  // the number of the last one; 0: none
 };
 
 // A scan without its points.
@@ -78,6 +79,24 @@ struct UnfinishedUpload {
   absl::Time touched = absl::UnixEpoch();  // when points last came; microseconds are kept
   std::uint32_t chunks = 0;
   std::uint64_t bytes = 0;  // of the chunks
+};
+
+// What only who has a map can do to it.
+enum class EditKind : std::uint8_t {  // stored
+  kSetPose = 1,
+  kDeleteScan = 2,
+  kSetLabels = 3,
+  kUpdateLabels = 4,  // those that are 0 leave what people said
+  kSetDefaultProfile = 5,
+};
+
+// An edit that is asked for where another process has the map.
+struct EditRequest {
+  std::uint64_t number = 0;  // in the order in which they were asked for
+  EditKind kind = EditKind::kSetPose;
+  ScanId scan;              // empty trajectory: of no scan
+  std::string value;        // the pose, labels or profile (core/engine/ingest/edits.h)
+  std::uint32_t begun = 0;  // how often, without an answer
 };
 
 // Who gave a scan labels after its upload.

@@ -15,6 +15,7 @@
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
 #include "core/common/stop.h"
@@ -29,6 +30,13 @@
 #include "core/world/scan.h"
 
 namespace strata {
+
+// Edits that wait at once in a map.
+inline constexpr std::uint64_t kMostEdits = 1000;
+
+inline absl::Status NoEdit(std::uint64_t number) {
+  return absl::NotFoundError(absl::StrCat("edit ", number, " does not exist"));
+}
 
 // Reads. One thread at a time; every call sees one committed state of its own, several calls inside
 // Snapshot() see the same one. A damaged row is DATA_LOSS naming it; a missing thing is NOT_FOUND
@@ -94,6 +102,19 @@ class StorageReader {
   virtual absl::StatusOr<std::vector<JobInfo>> ListJobs() = 0;
   // By kind and id.
   virtual absl::StatusOr<std::vector<Attempt>> ListAttempts() = 0;
+
+  // Edits that were asked for elsewhere (StorageWriter::PutEdit()): the first that waits with a
+  // number in (after, until]. A store that no other process writes has none.
+  virtual absl::StatusOr<std::optional<EditRequest>> FindEdit(std::uint64_t /*after*/,
+                                                              std::uint64_t /*until*/) {
+    return std::nullopt;
+  }
+  // The number of the last that waits; 0: none.
+  virtual absl::StatusOr<std::uint64_t> LastEdit() { return 0; }
+  // What became of one; nullopt: it waits. NOT_FOUND once it was withdrawn or forgotten.
+  virtual absl::StatusOr<std::optional<absl::Status>> FindAnswer(std::uint64_t edit) {
+    return NoEdit(edit);
+  }
 
   // The newest row of `key` that is not newer than `version`; nullopt where there is none or it
   // says that the tile is gone.
@@ -174,6 +195,23 @@ class StorageWriter {
   virtual absl::Status PutChanges(const std::vector<StoredChange>& /*changes*/) {
     return absl::OkStatus();
   }
+
+  // Asks who has the map alone for an edit; its number. It waits for an hour at most, and its
+  // answer is kept as long. RESOURCE_EXHAUSTED while kMostEdits wait.
+  virtual absl::StatusOr<std::uint64_t> PutEdit(const EditRequest& /*edit*/) {
+    return absl::UnimplementedError("store: nobody else has the map");
+  }
+  // It is carried out from now on.
+  virtual absl::Status BeginEdit(std::uint64_t edit) { return NoEdit(edit); }
+  // It has been carried out, by the same commit, or why it was not: with all that is attached to
+  // `answer`. ABORTED where it does not wait any more, so that a commit of it is undone.
+  virtual absl::Status AnswerEdit(std::uint64_t edit, const absl::Status& /*answer*/) {
+    return NoEdit(edit);
+  }
+  // Whether it waited, and will not be carried out.
+  virtual absl::StatusOr<bool> WithdrawEdit(std::uint64_t edit) { return NoEdit(edit); }
+  // Its answer was read.
+  virtual absl::Status ForgetEdit(std::uint64_t edit) { return NoEdit(edit); }
 
   // Points of an upload that is not a scan yet; `bytes` at most 1 MiB.
   virtual absl::Status PutChunk(std::uint64_t upload,

@@ -46,12 +46,11 @@ absl::Status EngineClassifiers::Delete(const api::Call& call,
                                        absl::string_view map,
                                        absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->core().writer().Run(
-      Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(const ClassifierInfo info, FindClassifier(writer.reader(), name));
-        return writer.DeleteClassifier(info.id);
-      });
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  return place.Commit(call.stop, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const ClassifierInfo info, FindClassifier(writer.reader(), name));
+    return writer.DeleteClassifier(info.id);
+  });
 }
 
 absl::Status EngineClassifiers::Export(const api::Call& call,
@@ -78,7 +77,7 @@ absl::StatusOr<ClassifierInfo> EngineClassifiers::Import(const api::Call& call,
                                                          absl::string_view name,
                                                          absl::string_view bytes) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("classifier name", name));
   ClassifierInfo info;
   info.name = std::string(name);
@@ -94,7 +93,10 @@ absl::StatusOr<ClassifierInfo> EngineClassifiers::Import(const api::Call& call,
   info.description = "imported";
   info.parameters = {{"method", std::string(ToString(classifier->method))},
                      {"features", std::string(ToString(classifier->features.set))}};
-  return AdoptClassifier(found->core(), std::move(info), *std::move(classifier));
+  STRATA_RETURN_IF_ERROR(place.Commit(call.stop, [&](StorageWriter& writer) {
+    return AdoptClassifier(writer, *classifier, info);
+  }));
+  return info;
 }
 
 }  // namespace strata

@@ -63,6 +63,8 @@ class Map {
   void ScanCommitted(ScanNumber number) { worker_->ScanCommitted(number); }
   // Scans became durable elsewhere.
   void ScansWait() { worker_->ScansWait(); }
+  // Edits up to number `until` were asked for elsewhere.
+  void EditsWait(std::uint64_t until) { worker_->EditsWait(until); }
   // A job was queued.
   void JobQueued() { runner_->JobQueued(); }
   // Jobs, or this one, may have been queued or decided elsewhere.

@@ -20,6 +20,7 @@
 #include "core/common/map_owner.h"
 #include "core/common/status.h"
 #include "core/engine/doors/backup.h"
+#include "core/engine/ingest/edits.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/tiles/map_stats.h"
 #include "core/world/names.h"
@@ -137,6 +138,45 @@ absl::StatusOr<EngineMaps::Place> EngineMaps::FindToAdd(const Stop& stop, absl::
   return place;
 }
 
+absl::Status EngineMaps::Place::Commit(const Stop& stop,
+                                       WriterThread::Work work,
+                                       std::size_t bytes) const {
+  if (map != nullptr) return map->core().writer().Run(Durability::kFull, bytes, stop, work);
+  StorageWriter& writer = store->writer();
+  return writer.Commit(Durability::kFull, [&] { return work(writer); });
+}
+
+absl::Status EngineMaps::Place::Read(absl::FunctionRef<absl::Status(StorageReader&)> body) const {
+  if (map != nullptr) {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, map->core().Reader());
+    return body(*reader);
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader, store->NewReader());
+  return body(*reader);
+}
+
+absl::Status EngineMaps::Edit(const Stop& stop,
+                              absl::string_view name,
+                              const Place& place,
+                              const EditRequest& edit) {
+  if (place.map != nullptr) {
+    // Those that were asked for before go first: one whose asker has died is not made later.
+    std::uint64_t behind = 0;
+    STRATA_RETURN_IF_ERROR(
+        place.Read([&](StorageReader& reader) { return AssignTo(reader.LastEdit(), behind); }));
+    return place.map->worker().Execute(
+        stop,
+        [&](Integrator& integrator) { return CarryOut(edit, integrator, stop); },
+        "an edit",
+        behind);
+  }
+  // Where nobody has the map any more this engine takes it, and finds the edit.
+  return AskForEdit(*place.store, edit, stop, [&]() -> absl::Status {
+    absl::Status here = maps_->Find(stop, name).status();
+    return absl::IsUnavailable(here) ? absl::OkStatus() : here;
+  });
+}
+
 absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
                                                        absl::string_view name) {
   STRATA_ASSIGN_OR_RETURN(MapReading found, FindToRead(call, name));
@@ -171,7 +211,8 @@ absl::StatusOr<MapInfo> EngineMaps::Create(const api::Call& call,
 absl::StatusOr<MapInfo> EngineMaps::Get(const api::Call& call, absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const MapReading found, FindToRead(call, name));
-  if (found.map() != nullptr) return found.map()->core().info();
+  // Others may have given it another origin.
+  if (found.map() != nullptr && !IsShared()) return found.map()->core().info();
   MapInfo info;
   STRATA_RETURN_IF_ERROR(found.ReadState(
       [&](StorageReader& reader, const MapClock&) { return AssignTo(reader.GetMapInfo(), info); }));
@@ -238,26 +279,21 @@ absl::Status EngineMaps::SetClass(const api::Call& call,
                                   absl::string_view name,
                                   const MapClass& map_class) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
+  STRATA_ASSIGN_OR_RETURN(const Place place, FindToAdd(call.stop, name));
   STRATA_RETURN_IF_ERROR(ValidateMapClass(map_class));
-  return map->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
-    return writer.PutClass(map_class);
-  });
+  return place.Commit(call.stop, [&](StorageWriter& writer) { return writer.PutClass(map_class); });
 }
 
 absl::Status EngineMaps::SetOrigin(const api::Call& call,
                                    absl::string_view name,
                                    const GeodeticOrigin& origin) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> map, Find(call.stop, name));
+  STRATA_ASSIGN_OR_RETURN(const Place place, FindToAdd(call.stop, name));
   STRATA_RETURN_IF_ERROR(ValidateGeodeticOrigin(origin));
-  MapCore& core = map->core();
-  return core.writer().Run(
-      Durability::kFull,
-      0,
-      call.stop,
-      [&](StorageWriter& writer) { return writer.PutOrigin(origin); },
-      [&] { core.set_origin(origin); });
+  const auto put = [&](StorageWriter& writer) { return writer.PutOrigin(origin); };
+  if (place.map == nullptr) return place.Commit(call.stop, put);
+  MapCore& core = place.map->core();
+  return core.writer().Run(Durability::kFull, 0, call.stop, put, [&] { core.set_origin(origin); });
 }
 
 absl::StatusOr<bool> EngineMaps::IsAt(absl::string_view name,

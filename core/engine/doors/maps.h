@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_DOORS_MAPS_H_
 #define STRATA_CORE_ENGINE_DOORS_MAPS_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -30,6 +31,8 @@
 #include "core/engine/map/engine_options.h"
 #include "core/engine/map/map_stores.h"
 #include "core/engine/map/numbers.h"
+#include "core/engine/map/writer.h"
+#include "core/storage/storage.h"
 
 namespace strata {
 
@@ -55,13 +58,25 @@ class EngineMaps final : public api::Maps {
                          std::uint64_t epoch,
                          const Stop& stop);
 
-  // The map where it is here; else its store, for scans and jobs that come in here while another
-  // engine has the map (MapStores::OpenToAdd()).
+  // The map where it is here; else its store, for what is decided in a commit while another engine
+  // has the map (MapStores::OpenToAdd()): scans and jobs that come in here, edits of rows.
   struct Place {
     std::shared_ptr<Map> map;
     std::unique_ptr<MapStorage> store;
+
+    // Runs `work` in a durable commit, and again where the store says so (StorageWriter::Commit).
+    // `bytes` as of WriterThread::Run().
+    absl::Status Commit(const Stop& stop, WriterThread::Work work, std::size_t bytes = 0) const;
+    // Runs `body` on the newest state.
+    absl::Status Read(absl::FunctionRef<absl::Status(StorageReader&)> body) const;
   };
   absl::StatusOr<Place> FindToAdd(const Stop& stop, absl::string_view name);
+  // Has the map's worker carry it out, wherever that is: `place` as FindToAdd() found it. `stop` as
+  // of Worker::Execute() and AskForEdit().
+  absl::Status Edit(const Stop& stop,
+                    absl::string_view name,
+                    const Place& place,
+                    const EditRequest& edit);
   const EngineOptions& options() const { return options_; }
   // Whether other engines use the same stores.
   bool IsShared() const { return stores_->IsShared(); }

@@ -60,24 +60,34 @@ absl::StatusOr<KindInfo> EngineObjects::RenameKind(const api::Call& call,
                                                    absl::string_view kind,
                                                    absl::string_view name) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return strata::RenameKind(found->core(), kind, name, call.stop);
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  KindInfo renamed;
+  STRATA_RETURN_IF_ERROR(place.Commit(call.stop, [&](StorageWriter& writer) {
+    return AssignTo(strata::RenameKind(writer, kind, name), renamed);
+  }));
+  return renamed;
 }
 
 absl::StatusOr<KindInfo> EngineObjects::ImportKind(const api::Call& call,
                                                    absl::string_view map,
                                                    const NewKind& kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return strata::ImportKind(found->core(), kind, call.stop);
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(ImportedKind imported, PrepareKind(kind));
+  STRATA_RETURN_IF_ERROR(place.Commit(
+      call.stop,
+      [&](StorageWriter& writer) { return PutImportedKind(writer, imported); },
+      imported.shape.size()));
+  return imported.info;
 }
 
 absl::Status EngineObjects::DeleteKind(const api::Call& call,
                                        absl::string_view map,
                                        absl::string_view kind) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return strata::DeleteKind(found->core(), kind, call.stop);
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  return place.Commit(call.stop,
+                      [&](StorageWriter& writer) { return strata::DeleteKind(writer, kind); });
 }
 
 absl::StatusOr<InferredInfo> EngineObjects::ListInferred(

@@ -138,9 +138,10 @@ class OpenMaps {
   void ForgetClosedBut(const std::set<std::string>& names);
   // Opens what engines that are gone left.
   void TakeAbandoned();
-  // Has maps look for scans and jobs that came in at other engines.
-  void TellOfArrivals();
+  // Has maps look for scans, jobs and edits that came in at other engines; whether edits did.
+  bool TellOfArrivals();
   void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
+  void TakeInOrigin(const std::string& name, const MapOutline& outline);
   // Whether there was room.
   bool OpenWanted(const std::string& name);
   void OpenAllWanted();

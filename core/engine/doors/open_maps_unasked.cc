@@ -28,26 +28,32 @@ namespace {
 // Of shared stores: how often all maps are looked at unasked.
 constexpr absl::Duration kSurveyInterval = absl::Minutes(1);
 constexpr absl::Duration kLongSurvey = absl::Milliseconds(500);  // is worth a line of the log
+// Whoever edits a map by another engine edits more: for so long it is looked for so often.
+constexpr absl::Duration kEditing = absl::Seconds(10);
+constexpr absl::Duration kLookWhileEditing = absl::Milliseconds(100);
 
 }  // namespace
 
 void OpenMaps::Loop() {
   NameThisThread("maps");
   bool surveyed = false;
+  absl::Time edited = absl::InfinitePast();  // elsewhere, last
   while (true) {
     Guarded([&]() -> absl::Status {
       if (!surveyed) surveyed = SurveyAgain(absl::ZeroDuration()).ok();
       if (surveyed && stores_.IsShared()) {
         SurveyAgain(kSurveyInterval).IgnoreError();  // the next one may succeed
         TakeAbandoned();
-        TellOfArrivals();
+        if (TellOfArrivals()) edited = SteadyNow();
       }
       OpenAllWanted();
       CloseIdle();
       return absl::OkStatus();
     }).IgnoreError();  // without memory it is done later
+    absl::Duration pause = options_.look_interval;
+    if (SteadyNow() - edited < kEditing) pause = std::min(pause, kLookWhileEditing);
     absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), options_.look_interval)) return;
+    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), pause)) return;
   }
 }
 
@@ -131,21 +137,41 @@ void OpenMaps::TakeAbandoned() {
   }
 }
 
-void OpenMaps::TellOfArrivals() {
+bool OpenMaps::TellOfArrivals() {
   const absl::StatusOr<std::vector<WaitingMap>> waiting = stores_.ListWaiting();
-  if (!waiting.ok()) return;  // the store is away; what waits there goes on waiting
+  if (!waiting.ok()) return false;  // the store is away; what waits there goes on waiting
+  bool edits = false;
   std::map<std::string, WaitingMap> arrived;
-  for (const WaitingMap& one : *waiting) arrived[one.name] = one;
+  for (const WaitingMap& one : *waiting) {
+    arrived[one.name] = one;
+    edits = edits || one.edits > 0;
+  }
   for (const std::shared_ptr<Map>& map : Open()) {
     const auto it = arrived.find(map->core().name());
     if (it != arrived.end() && it->second.scans) map->ScansWait();
+    if (it != arrived.end() && it->second.edits > 0) map->EditsWait(it->second.edits);
     // What waits or runs here may have been cancelled elsewhere. An error: it is looked again.
     const bool jobs = it != arrived.end() && it->second.jobs;
     if (jobs || map->HasJobs()) map->TakeInJobs().IgnoreError();
   }
+  return edits;
+}
+
+// The origin of a map that is open here may be set elsewhere.
+void OpenMaps::TakeInOrigin(const std::string& name, const MapOutline& outline) {
+  std::shared_ptr<Map> map;
+  {
+    absl::MutexLock lock(&mutex_);
+    const auto it = entries_.find(name);
+    if (it != entries_.end()) map = it->second.map;
+  }
+  if (map == nullptr) return;
+  if (map->core().info().parameters.origin == outline.info.parameters.origin) return;
+  map->core().TakeInOrigin().IgnoreError();  // the next look may succeed
 }
 
 void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline) {
+  if (outline.ok() && stores_.IsShared()) TakeInOrigin(name, *outline);
   bool first = false;
   {
     absl::MutexLock lock(&mutex_);

@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 
 #include "core/common/status.h"
+#include "core/engine/ingest/edits.h"
 #include "core/world/names.h"
 
 namespace strata {
@@ -136,17 +137,14 @@ absl::Status EnginePlanning::SetProfile(const api::Call& call,
                                         absl::string_view name,
                                         const RobotProfile& profile) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("profile name", name));
   STRATA_RETURN_IF_ERROR(ValidateRobotProfile(profile));
   if (name == api::kDefaultProfile) {
-    return found->worker().Execute(call.stop, [&](Integrator& integrator) {
-      return integrator.SetDefaultProfile(profile, call.stop);
-    });
+    return maps_.Edit(call.stop, map, place, SettingDefaultProfile(profile));
   }
-  return found->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
-    return writer.PutProfile(name, profile);
-  });
+  return place.Commit(call.stop,
+                      [&](StorageWriter& writer) { return writer.PutProfile(name, profile); });
 }
 
 absl::StatusOr<std::map<std::string, RobotProfile>> EnginePlanning::ListProfiles(

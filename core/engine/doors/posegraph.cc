@@ -15,6 +15,7 @@
 #include "core/engine/consistency/followed_robot.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/scans.h"
+#include "core/engine/ingest/edits.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/world/names.h"
 
@@ -112,38 +113,34 @@ absl::Status EnginePoseGraph::SetPose(const api::Call& call,
                                       const ScanId& id,
                                       const Pose& T_map_scan) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateName("trajectory name", id.trajectory));
   if (const absl::Status valid = ValidatePose(T_map_scan); !valid.ok()) {
     return Annotate(valid, absl::StrCat("scan ", id.ToString()));
   }
-  {
-    // Here, too: to hear of it nobody waits behind what the worker is at.
-    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, found->core().Reader());
-    STRATA_RETURN_IF_ERROR(NumberOf(*reader, id).status());
-  }
-  return found->worker().Execute(
-      call.stop, [&](Integrator& integrator) { return integrator.SetPose(id, T_map_scan); });
+  // Here, too: to hear of it nobody waits behind what the worker is at.
+  STRATA_RETURN_IF_ERROR(
+      place.Read([&](StorageReader& reader) { return NumberOf(reader, id).status(); }));
+  return maps_.Edit(call.stop, map, place, SettingPose(id, T_map_scan));
 }
 
 absl::StatusOr<Constraint> EnginePoseGraph::AddConstraint(const api::Call& call,
                                                           absl::string_view map,
                                                           const Constraint& constraint) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(ValidateConstraint(constraint));
   ConstraintRecord record;
   record.constraint = constraint;
   record.constraint.origin = ConstraintOrigin::kPerson;
-  STRATA_RETURN_IF_ERROR(found->core().writer().Run(
-      Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
-        if (!constraint.is_prior()) {
-          STRATA_ASSIGN_OR_RETURN(record.scan_i, NumberOf(writer.reader(), constraint.i));
-        }
-        STRATA_ASSIGN_OR_RETURN(record.scan_j, NumberOf(writer.reader(), constraint.j));
-        STRATA_ASSIGN_OR_RETURN(record.constraint.id, writer.PutConstraint(record));
-        return absl::OkStatus();
-      }));
+  STRATA_RETURN_IF_ERROR(place.Commit(call.stop, [&](StorageWriter& writer) -> absl::Status {
+    if (!constraint.is_prior()) {
+      STRATA_ASSIGN_OR_RETURN(record.scan_i, NumberOf(writer.reader(), constraint.i));
+    }
+    STRATA_ASSIGN_OR_RETURN(record.scan_j, NumberOf(writer.reader(), constraint.j));
+    STRATA_ASSIGN_OR_RETURN(record.constraint.id, writer.PutConstraint(record));
+    return absl::OkStatus();
+  }));
   return record.constraint;
 }
 
@@ -151,19 +148,18 @@ absl::Status EnginePoseGraph::RemoveConstraint(const api::Call& call,
                                                absl::string_view map,
                                                std::uint64_t id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->core().writer().Run(
-      Durability::kFull, 0, call.stop, [&](StorageWriter& writer) -> absl::Status {
-        STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
-        STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> planes,
-                                writer.reader().ListPlanes(clock.epoch));
-        for (const PlaneRecord& record : planes) {
-          if (record.plane.id != id) continue;
-          return absl::FailedPreconditionError(absl::StrCat(
-              "constraint ", id, " is a plane, which the next job would find again; disable it"));
-        }
-        return writer.DeleteConstraint(id);
-      });
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  return place.Commit(call.stop, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
+    STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> planes,
+                            writer.reader().ListPlanes(clock.epoch));
+    for (const PlaneRecord& record : planes) {
+      if (record.plane.id != id) continue;
+      return absl::FailedPreconditionError(absl::StrCat(
+          "constraint ", id, " is a plane, which the next job would find again; disable it"));
+    }
+    return writer.DeleteConstraint(id);
+  });
 }
 
 absl::Status EnginePoseGraph::EnableConstraint(const api::Call& call,
@@ -171,10 +167,9 @@ absl::Status EnginePoseGraph::EnableConstraint(const api::Call& call,
                                                std::uint64_t id,
                                                bool enabled) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  return found->core().writer().Run(Durability::kFull, 0, call.stop, [&](StorageWriter& writer) {
-    return writer.EnableConstraint(id, enabled);
-  });
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  return place.Commit(call.stop,
+                      [&](StorageWriter& writer) { return writer.EnableConstraint(id, enabled); });
 }
 
 absl::StatusOr<api::PoseLookup> EnginePoseGraph::LookupPose(const api::Call& call,

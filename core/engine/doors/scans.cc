@@ -17,6 +17,7 @@
 #include "core/engine/doors/local_map_upload.h"
 #include "core/engine/doors/map_reading.h"
 #include "core/engine/doors/upload.h"
+#include "core/engine/ingest/edits.h"
 #include "core/engine/ingest/upload_beside.h"
 #include "core/engine/map/scan_lookup.h"
 #include "core/engine/scans/scan_labels.h"
@@ -40,6 +41,12 @@ absl::StatusOr<PosedScan> FindScan(const MapReading& map, const Stop& stop, cons
         return absl::OkStatus();
       }));
   return posed;
+}
+
+// Who edits a scan that is not there does not wait behind what the worker is at to hear of it.
+absl::Status CheckThere(const EngineMaps::Place& place, const ScanId& id) {
+  STRATA_RETURN_IF_ERROR(CheckId(id));
+  return place.Read([&](StorageReader& reader) { return GetScanById(reader, id, 0).status(); });
 }
 
 absl::StatusOr<ScanQuery> ToQuery(const api::ScanFilter& filter) {
@@ -231,22 +238,19 @@ absl::Status EngineScans::SetLabels(const api::Call& call,
                                     const std::vector<std::uint16_t>& labels,
                                     api::LabelMode mode) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
   STRATA_RETURN_IF_ERROR(CheckId(id));
   STRATA_RETURN_IF_ERROR(Annotate(ValidateLabels(labels), absl::StrCat("scan ", id.ToString())));
-  // Here, too: to hear of it nobody waits behind what the worker is at.
-  STRATA_RETURN_IF_ERROR(FindScan(MapReading(found), call.stop, id).status());
-  return found->worker().Execute(call.stop, [&](Integrator& integrator) {
-    return integrator.SetPersonLabels(id, labels, mode == api::LabelMode::kUpdate);
-  });
+  STRATA_RETURN_IF_ERROR(CheckThere(place, id));
+  return maps_.Edit(
+      call.stop, map, place, SettingLabels(id, labels, mode == api::LabelMode::kUpdate));
 }
 
 absl::Status EngineScans::Delete(const api::Call& call, absl::string_view map, const ScanId& id) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<Map> found, maps_.Find(call.stop, map));
-  STRATA_RETURN_IF_ERROR(FindScan(MapReading(found), call.stop, id).status());
-  return found->worker().Execute(call.stop,
-                                 [&](Integrator& integrator) { return integrator.DeleteScan(id); });
+  STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  STRATA_RETURN_IF_ERROR(CheckThere(place, id));
+  return maps_.Edit(call.stop, map, place, DeletingScan(id));
 }
 
 }  // namespace strata

@@ -115,7 +115,7 @@ absl::Status Integrator::MakeServed(StorageReader& reader,
 
 absl::Status Integrator::Commit(const TileChange& change,
                                 const std::vector<ScanId>& scans,
-                                absl::FunctionRef<absl::Status(StorageWriter&)> decision,
+                                Decision decision,
                                 bool awaited) {
   const std::uint64_t floor = core_.snapshots().Floor();
   STRATA_ASSIGN_OR_RETURN(

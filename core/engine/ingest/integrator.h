@@ -44,6 +44,10 @@ struct FadingRequest {
 // One thread at a time: the worker's.
 class Integrator {
  public:
+  // What a commit does beside the change that it is made for; an error undoes both.
+  using Decision = absl::FunctionRef<absl::Status(StorageWriter&)>;
+  static absl::Status Nothing(StorageWriter&) { return absl::OkStatus(); }
+
   explicit Integrator(MapCore& core) : core_(core), aligner_(core.caches()), store_(core) {}
 
   // Integrates pending scans in commit order, at most `most_scans`, in transactions of
@@ -54,20 +58,21 @@ class Integrator {
   absl::StatusOr<int> IntegratePending(int most_scans, absl::FunctionRef<bool()> goes_on);
 
   // In any state. NOT_FOUND.
-  absl::Status DeleteScan(const ScanId& id);
+  absl::Status DeleteScan(const ScanId& id, Decision also = Nothing);
   // NOT_FOUND; FAILED_PRECONDITION unless the scan is integrated. Begins a new epoch.
-  absl::Status SetPose(const ScanId& id, const Pose& T_map_scan);
+  absl::Status SetPose(const ScanId& id, const Pose& T_map_scan, Decision also = Nothing);
   // Begins a new epoch with other poses, as ScanMover does.
   absl::StatusOr<MoveOutcome> MoveScans(const ScanMoves& moves,
                                         int threads,
                                         JobContext& context,
-                                        absl::FunctionRef<absl::Status(StorageWriter&)> decision);
+                                        Decision decision);
   // What a person says of a scan in any state; `update`: a label that is 0 leaves what people said
   // before. NOT_FOUND; FAILED_PRECONDITION where the points were dropped; INVALID_ARGUMENT unless
   // there is a label for every point.
   absl::Status SetPersonLabels(const ScanId& id,
                                const std::vector<std::uint16_t>& labels,
-                               bool update);
+                               bool update,
+                               Decision also = Nothing);
   // What a classifier says of it; errors as above.
   absl::Status SetModelLabels(ScanNumber number,
                               std::uint64_t model,
@@ -76,7 +81,9 @@ class Integrator {
   // left out. Returns how many changed. All at once: nothing has changed after an error.
   absl::StatusOr<std::size_t> SetFaded(const FadingRequest& request, JobContext& context);
   // Annotates all tiles for another robot.
-  absl::Status SetDefaultProfile(const RobotProfile& profile, const Stop& stop);
+  absl::Status SetDefaultProfile(const RobotProfile& profile,
+                                 const Stop& stop,
+                                 Decision also = Nothing);
 
   MapCore& core() { return core_; }
   MlsTileStore& store() { return store_; }
@@ -135,7 +142,8 @@ class Integrator {
   // Stores the labels, and has the tiles of the scan count them.
   absl::Status ChangeLabels(StorageReader& reader,
                             const PosedScan& posed,
-                            const LabelChange& change);
+                            const LabelChange& change,
+                            Decision also);
   // The tiles of the scan with the votes of its labels as they will be.
   absl::StatusOr<MlsTileMap> Revoted(StorageReader& reader,
                                      const PosedScan& posed,
@@ -149,7 +157,7 @@ class Integrator {
   // `scans`. As MapCore::Publish().
   absl::Status Commit(const TileChange& change,
                       const std::vector<ScanId>& scans,
-                      absl::FunctionRef<absl::Status(StorageWriter&)> decision,
+                      Decision decision,
                       bool awaited = true);
   // The tiles of `keys` from all their scans but `without`.
   absl::StatusOr<MlsTileMap> TilesWithout(StorageReader& reader,

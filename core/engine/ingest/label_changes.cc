@@ -70,12 +70,15 @@ absl::StatusOr<MlsTileMap> Integrator::Revoted(StorageReader& reader,
 
 absl::Status Integrator::ChangeLabels(StorageReader& reader,
                                       const PosedScan& posed,
-                                      const LabelChange& change) {
+                                      const LabelChange& change,
+                                      Decision also) {
   const absl::Cleanup edited = [this] { core_.NoteEdit(); };
   STRATA_RETURN_IF_ERROR(CheckLabels(posed.scan, change.labels.size()));
   const std::vector<std::string> pieces = EncodeLabelChange(change);
-  const auto put = [&](StorageWriter& writer) {
-    return writer.PutLabels(posed.scan.number, change.origin, change.model, pieces);
+  const auto put = [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(
+        writer.PutLabels(posed.scan.number, change.origin, change.model, pieces));
+    return also(writer);
   };
   TileChange tiles;
   if (posed.scan.state == ScanState::kIntegrated && posed.pose.has_value()) {
@@ -90,7 +93,8 @@ absl::Status Integrator::ChangeLabels(StorageReader& reader,
 
 absl::Status Integrator::SetPersonLabels(const ScanId& id,
                                          const std::vector<std::uint16_t>& labels,
-                                         bool update) {
+                                         bool update,
+                                         Decision also) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
   STRATA_RETURN_IF_ERROR(CheckLabels(posed.scan, labels.size()));
@@ -103,7 +107,7 @@ absl::Status Integrator::SetPersonLabels(const ScanId& id,
       if (change.labels[i] == 0) change.labels[i] = said[i];
     }
   }
-  return ChangeLabels(*reader, posed, change);
+  return ChangeLabels(*reader, posed, change, also);
 }
 
 absl::Status Integrator::SetModelLabels(ScanNumber number,
@@ -111,7 +115,7 @@ absl::Status Integrator::SetModelLabels(ScanNumber number,
                                         std::vector<std::uint16_t> labels) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, reader->GetScan(number, epoch()));
-  return ChangeLabels(*reader, posed, {LabelOrigin::kModel, model, std::move(labels)});
+  return ChangeLabels(*reader, posed, {LabelOrigin::kModel, model, std::move(labels)}, Nothing);
 }
 
 }  // namespace strata

@@ -13,7 +13,9 @@
 
 namespace strata {
 
-absl::Status Integrator::SetDefaultProfile(const RobotProfile& profile, const Stop& stop) {
+absl::Status Integrator::SetDefaultProfile(const RobotProfile& profile,
+                                           const Stop& stop,
+                                           Decision also) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
   StagedTiles staged(core_, version);
@@ -32,8 +34,9 @@ absl::Status Integrator::SetDefaultProfile(const RobotProfile& profile, const St
       [&stop](double) { return stop.status(); },
       [&staged](const SurfaceTileMaker::Rows& rows) { return staged.Put({}, rows); });
   STRATA_RETURN_IF_ERROR(made);
-  STRATA_RETURN_IF_ERROR(staged.Publish({}, [&profile](StorageWriter& writer) {
-    return writer.PutProfile(api::kDefaultProfile, profile);
+  STRATA_RETURN_IF_ERROR(staged.Publish({}, [&](StorageWriter& writer) -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer.PutProfile(api::kDefaultProfile, profile));
+    return also(writer);
   }));
   core_.set_default_profile(profile);
   return absl::OkStatus();

@@ -22,7 +22,7 @@ absl::StatusOr<MlsTileMap> Integrator::TilesWithout(StorageReader& reader,
   return MakeTiles(core_, scans, keys, core_.options().worker_threads, Stop());
 }
 
-absl::Status Integrator::DeleteScan(const ScanId& id) {
+absl::Status Integrator::DeleteScan(const ScanId& id, Decision also) {
   const absl::Cleanup edited = [this] { core_.NoteEdit(); };
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
@@ -35,17 +35,17 @@ absl::Status Integrator::DeleteScan(const ScanId& id) {
   STRATA_RETURN_IF_ERROR(MakeServed(*reader, change, core_.options().worker_threads));
   STRATA_RETURN_IF_ERROR(Commit(change, {id}, [&](StorageWriter& writer) -> absl::Status {
     STRATA_RETURN_IF_ERROR(core_.NoteInferredIfAny(writer.reader()));
-    return writer.DeleteScan(number);
+    STRATA_RETURN_IF_ERROR(writer.DeleteScan(number));
+    return also(writer);
   }));
   aligner_loaded_ = false;
   return absl::OkStatus();
 }
 
-absl::StatusOr<MoveOutcome> Integrator::MoveScans(
-    const ScanMoves& moves,
-    int threads,
-    JobContext& context,
-    absl::FunctionRef<absl::Status(StorageWriter&)> decision) {
+absl::StatusOr<MoveOutcome> Integrator::MoveScans(const ScanMoves& moves,
+                                                  int threads,
+                                                  JobContext& context,
+                                                  Decision decision) {
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t version, NextVersion());
   // Decoded tiles are kept by key alone: those of the coming epoch must not outlive a failure.
   store_.Clear();
@@ -56,7 +56,7 @@ absl::StatusOr<MoveOutcome> Integrator::MoveScans(
   return outcome;
 }
 
-absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
+absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan, Decision also) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
   STRATA_ASSIGN_OR_RETURN(const PosedScan posed, GetScanById(*reader, id, epoch()));
   const ScanRecord& scan = posed.scan;
@@ -72,11 +72,7 @@ absl::Status Integrator::SetPose(const ScanId& id, const Pose& T_map_scan) {
   moves.origin = PoseOrigin::kPerson;
   moves.reason = absl::StrCat("pose of ", id.ToString());
   SilentContext context{Stop()};
-  return MoveScans(moves,
-                   core_.options().worker_threads,
-                   context,
-                   [](StorageWriter&) { return absl::OkStatus(); })
-      .status();
+  return MoveScans(moves, core_.options().worker_threads, context, also).status();
 }
 
 }  // namespace strata

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -19,6 +20,7 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/common/this_thread.h"
+#include "core/engine/ingest/edits.h"
 #include "core/engine/map/engine_options.h"
 
 namespace strata {
@@ -32,6 +34,8 @@ constexpr absl::Duration kQueueDelay = absl::Milliseconds(200);
 constexpr int kBatchesInARow = 4;
 // So often a scan is tried again alone when there was no memory.
 constexpr int kMemoryTries = 10;
+// So often an edit is begun whose owner came to no end: it may have died of it.
+constexpr std::uint32_t kMostBegun = 5;
 
 // What there is no memory to log is not logged.
 void LogStopped(absl::string_view event, absl::string_view map, const absl::Status& why) {
@@ -53,6 +57,13 @@ absl::StatusOr<bool> NeedsRecovery(MapCore& core) {
   STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
   return !clock.derived_complete;
+}
+
+absl::StatusOr<std::optional<EditRequest>> FindEdit(MapCore& core,
+                                                    std::uint64_t after,
+                                                    std::uint64_t until) {
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+  return reader->FindEdit(after, until);
 }
 
 }  // namespace
@@ -94,17 +105,32 @@ void Worker::ScansWait() {
   waiting_.Add(ScanNumber{1}, SteadyNow());  // which no other is below
 }
 
+// Those that came since the last look wait for the next one: batches have their turn, too.
+void Worker::EditsWait(std::uint64_t until) {
+  absl::MutexLock lock(&mutex_);
+  if (EditWaits()) return;
+  edits_after_ = 0;
+  edits_until_ = until;
+}
+
 absl::Time Worker::WaitingSince(ScanNumber oldest) {
   absl::MutexLock lock(&mutex_);
   return waiting_.Since(oldest);
 }
 
-absl::Status Worker::Execute(const Stop& stop, Command command, absl::string_view what) {
-  Task task{command, what, absl::OkStatus()};
+absl::Status Worker::Execute(const Stop& stop,
+                             Command command,
+                             absl::string_view what,
+                             std::uint64_t behind) {
+  Task task{command, what, behind, absl::OkStatus()};
   const BlockingScope blocking;  // for as long as the pass under way takes
   absl::MutexLock lock(&mutex_);
   if (closed_) return why_closed_;
   if (refuses_) return Refusal();
+  if (behind > 0) {
+    if (!EditWaits()) edits_after_ = 0;
+    edits_until_ = std::max(edits_until_, behind);
+  }
   tasks_.push_back(&task);
   while (!mutex_.AwaitWithTimeout(absl::Condition(&task.done), kStopPoll)) {
     // The task must leave the queue before this frame is left, in whatever way.
@@ -133,19 +159,21 @@ absl::Status Worker::AwaitDerived(const Stop& stop) {
   return refuses_ ? Refusal() : why_closed_;
 }
 
-bool Worker::HasStep() const { return closed_ || !tasks_.empty() || pending_ > 0; }
+bool Worker::HasStep() const { return closed_ || !tasks_.empty() || EditWaits() || pending_ > 0; }
 
 bool Worker::HasWork() const {
   absl::MutexLock lock(&mutex_);
-  return pending_ > 0 || !(derived_usable_ || refuses_);
+  return pending_ > 0 || EditWaits() || !(derived_usable_ || refuses_);
 }
 
 bool Worker::AtRest() const {
   absl::MutexLock lock(&mutex_);
-  return refuses_ || (pending_ == 0 && tasks_.empty() && !steps_ && keeper_.AtRest());
+  return refuses_ ||
+         (pending_ == 0 && tasks_.empty() && !EditWaits() && !steps_ && keeper_.AtRest());
 }
 
-// Commands go first, since somebody waits for them.
+// Commands and edits go first, since somebody waits for them, in the order in which they were asked
+// for: whoever goes on asking elsewhere keeps nobody from his turn.
 Worker::Step Worker::NextStep() {
   absl::MutexLock lock(&mutex_);
   steps_ = false;
@@ -158,6 +186,7 @@ Worker::Step Worker::NextStep() {
   }
   steps_ = true;
   if (closed_) return Step::kClosed;
+  if (EditWaits() && (tasks_.empty() || tasks_.front()->behind > edits_after_)) return Step::kEdit;
   return tasks_.empty() ? Step::kBatch : Step::kCommand;
 }
 
@@ -176,6 +205,9 @@ void Worker::Loop() {
         break;
       case Step::kCommand:
         RunCommand();
+        break;
+      case Step::kEdit:
+        RunEdit();
         break;
       case Step::kBatch:
         // What there is no memory to say of it is not said.
@@ -220,6 +252,53 @@ void Worker::RunCommand() {
   task->done = true;
 }
 
+void Worker::RunEdit(const absl::Status& refusal) {
+  std::uint64_t after = 0, until = 0;
+  {
+    absl::MutexLock lock(&mutex_);
+    after = edits_after_;
+    until = edits_until_;
+    running_ = "an edit that was asked for at another server";
+  }
+  const absl::Status done = Guarded([&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const std::optional<EditRequest> edit, FindEdit(core_, after, until));
+    after = edit.has_value() ? edit->number : until;
+    return edit.has_value() ? Answer(*edit, refusal) : absl::OkStatus();
+  });
+  // What is not answered is found by the next look.
+  if (!done.ok()) LogStopped("edits", core_.name(), done);
+  absl::MutexLock lock(&mutex_);
+  edits_after_ = done.ok() ? after : until;
+  running_ = "the next step";
+}
+
+// The answer is part of the commit that carries it out, so that it is carried out once: also where
+// this engine ends meanwhile, and the next one finds it.
+absl::Status Worker::Answer(const EditRequest& edit, const absl::Status& refusal) {
+  absl::Status done = refusal;
+  if (done.ok() && edit.begun >= kMostBegun) {
+    done = absl::AbortedError(absl::StrCat(
+        "it was begun ", edit.begun, " times, and no server came to its end; nothing has changed"));
+  }
+  if (done.ok()) {
+    STRATA_RETURN_IF_ERROR(
+        core_.writer().Run(Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) {
+          return writer.BeginEdit(edit.number);
+        }));
+    const auto answer = [&](StorageWriter& writer) {
+      return writer.AnswerEdit(edit.number, absl::OkStatus());
+    };
+    done = GuardedStep([&] { return CarryOut(edit, integrator_, Stop(), answer); });
+  }
+  // What became of it is to be seen in the store, by whoever opens the map next.
+  if (done.ok() || !core_.doubt().ok()) return done;
+  const absl::Status told =
+      core_.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) {
+        return writer.AnswerEdit(edit.number, done);
+      });
+  return absl::IsAborted(told) ? absl::OkStatus() : told;  // it was withdrawn
+}
+
 void Worker::RunBatch() {
   std::uint64_t waited = 0;
   {
@@ -254,7 +333,7 @@ absl::StatusOr<int> Worker::Integrate() {
   if (begun == 0) return 0;
   return integrator_.IntegratePending(begun, [this] {
     absl::MutexLock lock(&mutex_);
-    return !closed_ && tasks_.empty();
+    return !closed_ && tasks_.empty() && !EditWaits();
   });
 }
 
@@ -293,14 +372,23 @@ bool Worker::RunRecovery() {
 
 void Worker::Refuse() {
   LogStopped("recovery", core_.name(), Refusal());
-  absl::MutexLock lock(&mutex_);
-  refuses_ = true;
-  for (Task* task : tasks_) {
-    task->status = Refusal();
-    task->done = true;
+  {
+    absl::MutexLock lock(&mutex_);
+    refuses_ = true;
+    for (Task* task : tasks_) {
+      task->status = Refusal();
+      task->done = true;
+    }
+    tasks_.clear();
   }
-  tasks_.clear();
-  mutex_.Await(absl::Condition(&closed_));
+  while (true) {
+    {
+      absl::MutexLock lock(&mutex_);
+      mutex_.Await(absl::Condition(this, &Worker::EditWaitsOrClosed));
+      if (closed_) return;
+    }
+    RunEdit(Refusal());
+  }
 }
 
 void Worker::Close(const absl::Status& why) {

@@ -1,5 +1,6 @@
 // The one thread behind a map that changes what is derived: integrates scans in commit order, and
-// between batches runs what callers and jobs ask for. At rest it prepares tiles for plans to come.
+// between batches runs what callers and jobs ask for, here or elsewhere. At rest it prepares tiles
+// for plans to come.
 #ifndef STRATA_CORE_ENGINE_INGEST_WORKER_H_
 #define STRATA_CORE_ENGINE_INGEST_WORKER_H_
 
@@ -44,6 +45,9 @@ class Worker {
   void ScanCommitted(ScanNumber number);
   // Scans may wait that came in elsewhere: they are looked for.
   void ScansWait();
+  // Edits up to number `until` wait that were asked for elsewhere: they are carried out before the
+  // next batch. Those that come meanwhile wait for the next call, behind a batch.
+  void EditsWait(std::uint64_t until);
   // Since when the scan waits that is the first of those that do; as of this process at most.
   absl::Time WaitingSince(ScanNumber oldest);
 
@@ -54,8 +58,12 @@ class Worker {
 
   // Runs `command` on the worker's thread, before the next batch, and returns its status. `stop`
   // ends the waiting (CANCELLED, DEADLINE_EXCEEDED, naming what is waited for); once begun, a
-  // command is waited for. `what`, for those that wait for it: "job 3 (rebuild)".
-  absl::Status Execute(const Stop& stop, Command command, absl::string_view what = "an edit");
+  // command is waited for. `what`, for those that wait for it: "job 3 (rebuild)". `behind`: edits
+  // that wait up to this number go first, others do not.
+  absl::Status Execute(const Stop& stop,
+                       Command command,
+                       absl::string_view what = "an edit",
+                       std::uint64_t behind = 0);
 
   // Whether scans wait, or what is derived has to be made again.
   bool HasWork() const;
@@ -69,11 +77,12 @@ class Worker {
   struct Task {
     Command command;
     absl::string_view what;
+    std::uint64_t behind;
     absl::Status status;
     bool begun = false;
     bool done = false;
   };
-  enum class Step { kClosed, kCommand, kBatch, kRest };
+  enum class Step { kClosed, kCommand, kEdit, kBatch, kRest };
 
   void Loop();
   // Calls recover_ if what is derived is not usable; whether it is then.
@@ -82,11 +91,19 @@ class Worker {
   void Refuse();
   Step NextStep() ABSL_LOCKS_EXCLUDED(mutex_);
   bool HasStep() const ABSL_SHARED_LOCKS_REQUIRED(mutex_);
+  bool EditWaits() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return edits_after_ < edits_until_; }
+  bool EditWaitsOrClosed() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return closed_ || EditWaits();
+  }
   // Runs one step so that whatever it throws is an error of it alone.
   absl::Status GuardedStep(absl::FunctionRef<absl::Status()> step);
   // What there is time for when nothing else is to be done.
   void RunRest();
   void RunCommand();
+  // The next edit that was asked for elsewhere; `refusal`: answers it with that.
+  void RunEdit(const absl::Status& refusal = absl::OkStatus());
+  // Whether it is answered, or nobody waits for it any more.
+  absl::Status Answer(const EditRequest& edit, const absl::Status& refusal);
   void RunBatch();
   absl::StatusOr<int> Integrate();
   // After a batch for which there was no memory.
@@ -108,6 +125,9 @@ class Worker {
   absl::string_view running_ ABSL_GUARDED_BY(mutex_) = "recovery";  // what the thread is at
   std::uint64_t pending_ ABSL_GUARDED_BY(mutex_);
   WaitingScans waiting_ ABSL_GUARDED_BY(mutex_);
+  // Edits with numbers in between may wait.
+  std::uint64_t edits_after_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t edits_until_ ABSL_GUARDED_BY(mutex_) = 0;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   absl::Status why_closed_ ABSL_GUARDED_BY(mutex_);
   bool steps_ ABSL_GUARDED_BY(mutex_) = true;  // the thread is at one

@@ -106,15 +106,9 @@ absl::StatusOr<ClassifierInfo> StoreClassifier(MapCore& core,
   return info;
 }
 
-absl::StatusOr<ClassifierInfo> AdoptClassifier(MapCore& core,
-                                               ClassifierInfo info,
-                                               Classifier classifier) {
-  STRATA_RETURN_IF_ERROR(
-      core.writer().Run(Durability::kFull, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
-        STRATA_RETURN_IF_ERROR(MatchClasses(writer, classifier.classes));
-        return Put(writer, classifier, info);
-      }));
-  return info;
+absl::Status AdoptClassifier(StorageWriter& writer, Classifier classifier, ClassifierInfo& info) {
+  STRATA_RETURN_IF_ERROR(MatchClasses(writer, classifier.classes));
+  return Put(writer, classifier, info);
 }
 
 }  // namespace strata

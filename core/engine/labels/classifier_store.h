@@ -35,11 +35,9 @@ absl::StatusOr<ClassifierInfo> StoreClassifier(MapCore& core,
                                                ClassifierInfo info,
                                                const Classifier& classifier);
 
-// The same for one from elsewhere: its classes become those of the map by name, and are added to
-// the map's table where they are not in it.
-absl::StatusOr<ClassifierInfo> AdoptClassifier(MapCore& core,
-                                               ClassifierInfo info,
-                                               Classifier classifier);
+// The same, inside a commit, for one from elsewhere: its classes become those of the map by name,
+// and are added to the map's table where they are not in it. `info`: what is known of it then.
+absl::Status AdoptClassifier(StorageWriter& writer, Classifier classifier, ClassifierInfo& info);
 
 }  // namespace strata
 

@@ -134,6 +134,19 @@ void MapCore::set_origin(const GeodeticOrigin& origin) {
   info_.parameters.origin = origin;
 }
 
+// On the writer's thread, so that none of this process that is newer is lost.
+absl::Status MapCore::TakeInOrigin() {
+  MapInfo stored;
+  const auto read = [&](StorageWriter& writer) -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(stored, writer.reader().GetMapInfo());
+    return absl::OkStatus();
+  };
+  return writer_.Run(Durability::kRelaxed, 0, Stop(), read, [&] {
+    absl::MutexLock lock(&mutex_);
+    info_.parameters.origin = stored.parameters.origin;
+  });
+}
+
 void MapCore::NoteUnreadable(const TileKey& key) {
   absl::MutexLock lock(&mutex_);
   unreadable_.insert(key);

@@ -56,6 +56,8 @@ class MapCore {
   MapInfo info() const;
   void set_default_profile(const RobotProfile& profile);
   void set_origin(const GeodeticOrigin& origin);
+  // As others have set it in the store.
+  absl::Status TakeInOrigin();
 
   absl::StatusOr<ReaderPool::Lease> Reader() { return readers_.Take(); }
   WriterThread& writer() { return writer_; }

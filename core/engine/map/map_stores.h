@@ -68,7 +68,7 @@ class MapStores {
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: for scans and jobs that come in here while another engine has the map alone:
+  // Of shared ones: for what comes in here while another engine has the map alone:
   // PutScan() is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE
   // where chunks of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has
   // it alone.
@@ -76,7 +76,7 @@ class MapStores {
                                                                 std::uint64_t) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
-  // Of shared ones: maps that this engine has alone and in which scans or jobs wait.
+  // Of shared ones: maps that this engine has alone and in which scans, jobs or edits wait.
   virtual absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const {
     return std::vector<WaitingMap>();
   }

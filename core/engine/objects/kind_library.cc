@@ -122,32 +122,32 @@ absl::StatusOr<ThingKind> ReadKind(const MapState& state, absl::string_view kind
   return read;
 }
 
-absl::StatusOr<KindInfo> RenameKind(MapCore& core,
+absl::StatusOr<KindInfo> RenameKind(StorageWriter& writer,
                                     absl::string_view kind,
-                                    absl::string_view name,
-                                    const Stop& stop) {
+                                    absl::string_view name) {
   STRATA_RETURN_IF_ERROR(ValidateName("kind name", name));
-  KindInfo info;
-  const auto work = [&](StorageWriter& writer) -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(info, KindIn(writer.reader(), kind));
-    const bool known = info.in_library();
-    info.name = std::string(name);
-    if (known) return writer.RenameKind(info.id, name);
-    STRATA_RETURN_IF_ERROR(CheckRoom(writer.reader(), name));
-    STRATA_ASSIGN_OR_RETURN(const KindShape shape, ShapeOf(writer.reader(), info.id));
-    info.origin = KindOrigin::kNamed;
-    info.made = NowKept();
-    return writer.PutKind({info.id, info.name, true, EncodeKindInfo(info)}, EncodeKindShape(shape));
-  };
-  STRATA_RETURN_IF_ERROR(core.writer().Run(Durability::kFull, 0, stop, work));
+  STRATA_ASSIGN_OR_RETURN(KindInfo info, KindIn(writer.reader(), kind));
+  const bool known = info.in_library();
+  info.name = std::string(name);
+  if (known) {
+    STRATA_RETURN_IF_ERROR(writer.RenameKind(info.id, name));
+    return info;
+  }
+  STRATA_RETURN_IF_ERROR(CheckRoom(writer.reader(), name));
+  STRATA_ASSIGN_OR_RETURN(const KindShape shape, ShapeOf(writer.reader(), info.id));
+  info.origin = KindOrigin::kNamed;
+  info.made = NowKept();
+  STRATA_RETURN_IF_ERROR(
+      writer.PutKind({info.id, info.name, true, EncodeKindInfo(info)}, EncodeKindShape(shape)));
   return info;
 }
 
-absl::StatusOr<KindInfo> ImportKind(MapCore& core, const NewKind& kind, const Stop& stop) {
+absl::StatusOr<ImportedKind> PrepareKind(const NewKind& kind) {
   STRATA_RETURN_IF_ERROR(ValidateName("kind name", kind.name));
   STRATA_RETURN_IF_ERROR(ValidateName("class name", kind.class_name));
   STRATA_RETURN_IF_ERROR(ValidateKindShape(kind.shape));
-  KindInfo info;
+  ImportedKind imported;
+  KindInfo& info = imported.info;
   info.id = KindIdOf(kind.shape);
   info.name = kind.name;
   info.origin = KindOrigin::kImported;
@@ -155,27 +155,26 @@ absl::StatusOr<KindInfo> ImportKind(MapCore& core, const NewKind& kind, const St
   info.size = SizeOf(kind.shape);
   info.points = kind.shape.points.size();
   info.triangles = kind.shape.triangles.size();
-  const std::string shape = EncodeKindShape(kind.shape);
-  const auto work = [&](StorageWriter& writer) -> absl::Status {
-    STRATA_RETURN_IF_ERROR(CheckRoom(writer.reader(), info.name));
-    STRATA_ASSIGN_OR_RETURN(info.class_id, ClassCalled(writer, kind.class_name));
-    return writer.PutKind({info.id, info.name, true, EncodeKindInfo(info)}, shape);
-  };
-  STRATA_RETURN_IF_ERROR(core.writer().Run(Durability::kFull, shape.size(), stop, work));
-  return info;
+  imported.class_name = kind.class_name;
+  imported.shape = EncodeKindShape(kind.shape);
+  return imported;
 }
 
-absl::Status DeleteKind(MapCore& core, absl::string_view kind, const Stop& stop) {
-  const auto work = [&](StorageWriter& writer) -> absl::Status {
-    STRATA_ASSIGN_OR_RETURN(const KindInfo info, KindIn(writer.reader(), kind));
-    if (info.in_library()) return writer.DeleteKind(info.id);
-    return absl::FailedPreconditionError(
-        absl::StrCat("kind ",
-                     KindIdText(info.id),
-                     " has no name: the next objects find would find it again; kinds that were "
-                     "named or imported can be deleted"));
-  };
-  return core.writer().Run(Durability::kFull, 0, stop, work);
+absl::Status PutImportedKind(StorageWriter& writer, ImportedKind& kind) {
+  KindInfo& info = kind.info;
+  STRATA_RETURN_IF_ERROR(CheckRoom(writer.reader(), info.name));
+  STRATA_ASSIGN_OR_RETURN(info.class_id, ClassCalled(writer, kind.class_name));
+  return writer.PutKind({info.id, info.name, true, EncodeKindInfo(info)}, kind.shape);
+}
+
+absl::Status DeleteKind(StorageWriter& writer, absl::string_view kind) {
+  STRATA_ASSIGN_OR_RETURN(const KindInfo info, KindIn(writer.reader(), kind));
+  if (info.in_library()) return writer.DeleteKind(info.id);
+  return absl::FailedPreconditionError(
+      absl::StrCat("kind ",
+                   KindIdText(info.id),
+                   " has no name: the next objects find would find it again; kinds that were "
+                   "named or imported can be deleted"));
 }
 
 absl::Status CheckKinds(MapCore& core, const Stop& stop) {

@@ -2,6 +2,7 @@
 #ifndef STRATA_CORE_ENGINE_OBJECTS_KIND_LIBRARY_H_
 #define STRATA_CORE_ENGINE_OBJECTS_KIND_LIBRARY_H_
 
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -25,12 +26,21 @@ absl::StatusOr<bool> IsLibrary(StorageReader& reader, const std::vector<ThingKin
 
 // As of api::Objects; entities are not counted.
 absl::StatusOr<ThingKind> ReadKind(const MapState& state, absl::string_view kind);
-absl::StatusOr<KindInfo> RenameKind(MapCore& core,
+// Inside a commit.
+absl::StatusOr<KindInfo> RenameKind(StorageWriter& writer,
                                     absl::string_view kind,
-                                    absl::string_view name,
-                                    const Stop& stop);
-absl::StatusOr<KindInfo> ImportKind(MapCore& core, const NewKind& kind, const Stop& stop);
-absl::Status DeleteKind(MapCore& core, absl::string_view kind, const Stop& stop);
+                                    absl::string_view name);
+absl::Status DeleteKind(StorageWriter& writer, absl::string_view kind);
+
+// A kind on its way into a library.
+struct ImportedKind {
+  KindInfo info;  // its class once it is there
+  std::string class_name;
+  std::string shape;  // encoded
+};
+absl::StatusOr<ImportedKind> PrepareKind(const NewKind& kind);
+// Inside a commit.
+absl::Status PutImportedKind(StorageWriter& writer, ImportedKind& kind);
 
 // DATA_LOSS naming the first kind whose shape is damaged, or is not that of its id.
 absl::Status CheckKinds(MapCore& core, const Stop& stop);

@@ -336,17 +336,19 @@ absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
-      lease->Query("SELECT * FROM (SELECT p.name, EXISTS (SELECT FROM truth_scan AS s WHERE s.map "
-                   "= l.map AND s.state = $3) AS scans, EXISTS (SELECT FROM truth_job AS j WHERE "
-                   "j.map = l.map AND j.state = $4) AS jobs FROM map_lease AS l JOIN map_place AS "
-                   "p ON p.map = l.map WHERE l.holder = $1 AND p.state = $2) AS w WHERE w.scans OR "
-                   "w.jobs",
-                   leases_->holder(),
-                   kThere,
-                   static_cast<int>(ScanState::kPending),
-                   static_cast<int>(JobState::kQueued)));
+      lease->Query(
+          "SELECT * FROM (SELECT p.name, EXISTS (SELECT FROM truth_scan AS s WHERE s.map "
+          "= l.map AND s.state = $3) AS scans, EXISTS (SELECT FROM truth_job AS j WHERE "
+          "j.map = l.map AND j.state = $4) AS jobs, (SELECT max(e.number) FROM map_edit AS "
+          "e WHERE e.map = l.map AND e.answer IS NULL) AS edits FROM map_lease AS l JOIN "
+          "map_place AS p ON p.map = l.map WHERE l.holder = $1 AND p.state = $2) AS w "
+          "WHERE w.scans OR w.jobs OR w.edits > 0",
+          leases_->holder(),
+          kThere,
+          static_cast<int>(ScanState::kPending),
+          static_cast<int>(JobState::kQueued)));
   std::vector<WaitingMap> waiting;
-  while (row.Next()) waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2)});
+  while (row.Next()) waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2), row.Unsigned(3)});
   return waiting;
 }
 
@@ -496,6 +498,7 @@ absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {
     STRATA_RETURN_IF_ERROR(lease->Change(sql, map).status());
   }
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_change WHERE map = $1", map).status());
+  STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_edit WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM derived_state WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_lease WHERE map = $1", map).status());
   STRATA_RETURN_IF_ERROR(lease->Change("DELETE FROM map_place WHERE map = $1", map).status());

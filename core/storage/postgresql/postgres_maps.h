@@ -87,7 +87,7 @@ class PostgresMaps {
   // takes it. NOT_FOUND.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                         std::uint64_t most_waiting) const;
-  // Those that this process has alone in which scans or jobs wait, whoever added them.
+  // Those that this process has alone in which scans, jobs or edits wait, whoever added them.
   absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const;
   // Makes a map of a map file that nobody has open, all or nothing: of the current format and
   // closed well (FAILED_PRECONDITION). Its clock begins behind those of all maps that were removed.

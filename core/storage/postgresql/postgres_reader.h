@@ -41,6 +41,10 @@ class PostgresReader final : public StorageReader {
   absl::StatusOr<MapClock> GetClock() override;
   absl::StatusOr<MapInfo> GetMapInfo() override;
   absl::StatusOr<StoredChanges> ListChanges(std::uint64_t since) override;
+  absl::StatusOr<std::optional<EditRequest>> FindEdit(std::uint64_t after,
+                                                      std::uint64_t until) override;
+  absl::StatusOr<std::uint64_t> LastEdit() override;
+  absl::StatusOr<std::optional<absl::Status>> FindAnswer(std::uint64_t edit) override;
   absl::StatusOr<std::optional<PosedScan>> FindScan(const ScanId& id, std::uint64_t epoch) override;
   absl::StatusOr<PosedScan> GetScan(ScanNumber number, std::uint64_t epoch) override;
   absl::StatusOr<std::vector<ScanNumber>> ListScanNumbers() override;

@@ -60,6 +60,11 @@ class PostgresWriter final : public StorageWriter {
   StorageReader& reader() override { return reader_; }
   absl::StatusOr<std::uint64_t> NextCommitSequence() override;
   absl::Status PutChanges(const std::vector<StoredChange>& changes) override;
+  absl::StatusOr<std::uint64_t> PutEdit(const EditRequest& edit) override;
+  absl::Status BeginEdit(std::uint64_t edit) override;
+  absl::Status AnswerEdit(std::uint64_t edit, const absl::Status& answer) override;
+  absl::StatusOr<bool> WithdrawEdit(std::uint64_t edit) override;
+  absl::Status ForgetEdit(std::uint64_t edit) override;
 
   absl::Status PutChunk(std::uint64_t upload,
                         std::uint32_t ordinal,

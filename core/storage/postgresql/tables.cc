@@ -344,6 +344,21 @@ ALTER TABLE derived_state ADD COLUMN changes_after bigint NOT NULL DEFAULT 92233
 UPDATE derived_state AS d SET changes_after = m.commit_sequence FROM truth_map AS m WHERE m.map = d.map;
 )sql";
 
+// Since version 4: edits that wait for who has the map, and his answers, which somebody waits for.
+constexpr char kEdits[] = R"sql(
+CREATE TABLE map_edit (
+  map bigint NOT NULL, number bigint GENERATED ALWAYS AS IDENTITY,
+  made timestamptz NOT NULL DEFAULT clock_timestamp(),
+  kind bigint NOT NULL,
+  trajectory text NOT NULL,
+  sequence bigint NOT NULL,
+  value bytea NOT NULL,
+  begun bigint NOT NULL DEFAULT 0,
+  answer bytea,
+  PRIMARY KEY (map, number)
+);
+)sql";
+
 constexpr std::array<const char*, 13> kDerived = {
     "DELETE FROM derived_mls_tile WHERE map = $1",
     "DELETE FROM derived_surface_tile WHERE map = $1",
@@ -407,6 +422,10 @@ absl::Status MakeInTransaction(Connection& connection) {
   if (version < 3) {
     STRATA_RETURN_IF_ERROR(connection.Execute(kChanges));
     STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 3"));
+  }
+  if (version < 4) {
+    STRATA_RETURN_IF_ERROR(connection.Execute(kEdits));
+    STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 4"));
   }
   return connection.Execute("COMMIT");
 }

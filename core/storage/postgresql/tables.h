@@ -13,9 +13,9 @@
 namespace strata {
 
 // Newest format of the tables this program reads and writes.
-inline constexpr std::int64_t kDatabaseVersion = 3;
+inline constexpr std::int64_t kDatabaseVersion = 4;
 
-// Makes the tables where there are none, or adds what those of versions 1 and 2 lack; safe when
+// Makes the tables where there are none, or adds what those of earlier versions lack; safe when
 // others do so at the same time. FAILED_PRECONDITION for a newer format.
 absl::Status MakeTables(Connection& connection);
 

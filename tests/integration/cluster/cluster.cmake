@@ -9,7 +9,8 @@ add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
 set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
-# The conformance suite by the server that has not got the maps. Uploads that begin there do not go on where they broke.
+# The conformance suite by the server that has not got the maps. Uploads that begin there do not go on where they broke, and
+# tiles of earlier epochs are the owner's.
 strata_executable(
   beside_suite_test beside_suite_test
   SOURCES cluster/beside_suite_test.cc
@@ -18,7 +19,7 @@ strata_executable(
 )
 add_test(
   NAME beside_suite_test
-  COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*
+  COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*:*AnEarlierEpochHasTheTilesOfItsPoses*
 )
 set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 2400 COST 600)
 
@@ -32,6 +33,17 @@ strata_executable(
 add_dependencies(plans_elsewhere_test stratad)
 add_test(NAME plans_elsewhere_test COMMAND plans_elsewhere_test)
 set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
+
+# Edits by the server that has not got the map.
+strata_executable(
+  edits_elsewhere_test edits_elsewhere_test
+  SOURCES stratad_process.cc cluster/edits_elsewhere_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(edits_elsewhere_test stratad)
+add_test(NAME edits_elsewhere_test COMMAND edits_elsewhere_test)
+set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
 
 # Watches by the server that has not got the map.
 strata_executable(

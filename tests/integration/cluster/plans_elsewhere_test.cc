@@ -166,7 +166,7 @@ TEST_F(PlansElsewhereTest, AreTheOwnersToTheByteAndGoOnWhenItDies) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto owners, AskAll(db(0), kHalls));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto others, AskAll(db(1), kHalls));
   EXPECT_EQ(owners, others);
-  EXPECT_EQ(MapOwnerOf(db(1).maps().SetClass({}, kShared, {7, "wall", 0})), "a");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(1), kShared)), "a");
   servers_[0]->Kill();
   STRATA_ASSERT_OK_AND_ASSIGN(const auto orphaned, AskAll(db(1), kHalls));
   EXPECT_EQ(owners, orphaned);
@@ -310,7 +310,7 @@ TEST_F(PlansElsewhereTest, ARobotIsFollowedThroughTheDeathOfTheOwner) {
     if (step == 10) servers_[0]->Kill();
     // This server takes the map over.
     if (step == 15) {
-      STRATA_ASSERT_OK(Insist([&] { return db(1).maps().SetClass({}, kShared, {7, "wall", 0}); }));
+      STRATA_ASSERT_OK(Insist([&] { return AskTheOwner(db(1), kShared); }));
     }
   }
 }

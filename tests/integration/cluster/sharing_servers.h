@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
@@ -19,6 +21,9 @@
 #include "client/sdk/client.h"
 #include "core/api/database.h"
 #include "core/common/status.h"
+#include "core/common/steady_time.h"
+#include "core/common/stop.h"
+#include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
@@ -117,6 +122,30 @@ class SharingServersTest : public ::testing::Test {
   std::vector<std::unique_ptr<SharingServer>> servers_;
   std::vector<std::shared_ptr<api::Database>> held_;
 };
+
+inline constexpr std::size_t kNumberedPoints = 100;
+
+// The scan of that number; a call that lasts no longer than four seconds.
+inline absl::StatusOr<ScanAck> PutNumbered(api::Database& db,
+                                           const char* map,
+                                           std::uint64_t sequence) {
+  api::Call call;
+  call.stop = Stop(SteadyNow() + absl::Seconds(4));
+  const PointCloud cloud = NumberedCloud(sequence, kNumberedPoints);
+  STRATA_ASSIGN_OR_RETURN(const auto upload,
+                          db.scans().Upload(call, map, NumberedHeader(sequence, cloud)));
+  if (upload->points_held() < cloud.size()) STRATA_RETURN_IF_ERROR(upload->Write(cloud));
+  return upload->Finish();
+}
+
+// For tiles of an epoch that never was, which only the server that has the map can say: OK if this
+// one has it.
+inline absl::Status AskTheOwner(api::Database& db, const char* map) {
+  api::TileArea area;
+  area.epoch = 1'000'000;
+  const absl::Status asked = db.tiles().List({}, map, area).status();
+  return absl::IsNotFound(asked) ? absl::OkStatus() : asked;
+}
 
 // Once no scan of the map is pending.
 inline absl::StatusOr<MapStats> AtRest(api::Database& db, const char* map) {

@@ -42,17 +42,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr const char* kMap = kShared;
-constexpr std::size_t kPoints = 100;
-
-absl::StatusOr<ScanAck> Put(api::Database& db, const char* map, std::uint64_t sequence) {
-  api::Call call;
-  call.stop = Stop(SteadyNow() + absl::Seconds(4));
-  const PointCloud cloud = NumberedCloud(sequence, kPoints);
-  STRATA_ASSIGN_OR_RETURN(const auto upload,
-                          db.scans().Upload(call, map, NumberedHeader(sequence, cloud)));
-  if (upload->points_held() < cloud.size()) STRATA_RETURN_IF_ERROR(upload->Write(cloud));
-  return upload->Finish();
-}
+constexpr std::size_t kPoints = kNumberedPoints;
 
 class TwoServersTest : public SharingServersTest {
  protected:
@@ -60,7 +50,7 @@ class TwoServersTest : public SharingServersTest {
   void PutSomewhere(std::uint64_t sequence, std::size_t first) {
     std::size_t server = first;
     STRATA_EXPECT_OK(Insist([&] {
-      const auto ack = Put(*servers_[server++ % 2]->db(), kMap, sequence);
+      const auto ack = PutNumbered(*servers_[server++ % 2]->db(), kMap, sequence);
       if (ack.ok()) Note(sequence, ack->commit_sequence);
       return ack.status();
     }));
@@ -93,11 +83,6 @@ absl::Status RunJobOf(api::Database& db, const char* map, const char* kind) {
 
 absl::Status Verify(api::Database& db, const char* map) { return RunJobOf(db, map, "verify"); }
 
-// Something that whoever has the map decides.
-absl::Status Decide(api::Database& db, const char* map) {
-  return db.maps().SetClass({}, map, {7, "wall", 0});
-}
-
 void TwoServersTest::CheckAll(std::size_t server) {
   api::Database& found = db(server);
   MapStats stats;
@@ -116,14 +101,15 @@ void TwoServersTest::CheckAll(std::size_t server) {
   std::size_t next = server;
   STRATA_EXPECT_OK(Insist([&] { return Verify(*servers_[next++ % 2]->db(), kMap); }));
   STRATA_ASSERT_OK(found.maps().Create({}, "alone", MapParameters()));
-  for (const auto& [sequence, number] : numbers_) STRATA_ASSERT_OK(Put(found, "alone", sequence));
+  for (const auto& [sequence, number] : numbers_)
+    STRATA_ASSERT_OK(PutNumbered(found, "alone", sequence));
   STRATA_ASSERT_OK_AND_ASSIGN(const MapStats alone, AtRest(found, "alone"));
   EXPECT_EQ(stats.content_digest, alone.content_digest);
 }
 
 TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
-  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  const absl::Status refused = Decide(db(1), kMap);
+  STRATA_ASSERT_OK(PutNumbered(db(0), kMap, 1));
+  const absl::Status refused = AskTheOwner(db(1), kMap);
   EXPECT_THAT(refused, StatusIs(absl::StatusCode::kUnavailable, HasSubstr("server a")));
   EXPECT_EQ(MapOwnerOf(refused), "a");
   EXPECT_TRUE(RetryDelayOf(refused).has_value());
@@ -134,7 +120,7 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   EXPECT_EQ(names->front().name, kMap);
   // Other maps are other matters, and what one server removes the other has no more.
   STRATA_ASSERT_OK(db(1).maps().Create({}, "other", MapParameters()));
-  EXPECT_EQ(MapOwnerOf(Decide(db(0), "other")), "b");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(0), "other")), "b");
   STRATA_EXPECT_OK(db(1).maps().Delete({}, "other"));
   STRATA_EXPECT_OK(Insist([&] {
     const absl::Status gone = db(0).maps().Get({}, "other").status();
@@ -143,24 +129,24 @@ TEST_F(TwoServersTest, TheOneWithoutTheMapSaysWhoHasIt) {
   // A server that ends gives its maps up at once.
   servers_[0]->Signal(SIGTERM);
   const absl::Time ended = absl::Now();
-  STRATA_EXPECT_OK(Insist([&] { return Decide(db(1), kMap); }));
+  STRATA_EXPECT_OK(Insist([&] { return AskTheOwner(db(1), kMap); }));
   std::printf("taken over after %s\n", absl::FormatDuration(absl::Now() - ended).c_str());
 }
 
 // Acknowledged by whichever is asked, integrated by the one that has the map, and the same map.
 TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
-  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  Note(1, Put(db(0), kMap, 1)->commit_sequence);
+  STRATA_ASSERT_OK(PutNumbered(db(0), kMap, 1));
+  Note(1, PutNumbered(db(0), kMap, 1)->commit_sequence);
   std::vector<std::thread> robots;
   for (std::uint64_t robot = 0; robot < 4; ++robot) {
     robots.emplace_back([&, robot] {
       for (std::uint64_t i = 0; i < 8; ++i) {
         const std::uint64_t sequence = 2 + robot + 4 * i;
-        const auto ack = Put(*servers_[(robot + i) % 2]->db(), kMap, sequence);
+        const auto ack = PutNumbered(*servers_[(robot + i) % 2]->db(), kMap, sequence);
         STRATA_ASSERT_OK(ack);  // none is refused
         EXPECT_FALSE(ack->already_present);
         Note(sequence, ack->commit_sequence);
-        const auto again = Put(*servers_[(robot + i + 1) % 2]->db(), kMap, sequence);
+        const auto again = PutNumbered(*servers_[(robot + i + 1) % 2]->db(), kMap, sequence);
         STRATA_ASSERT_OK(again);
         EXPECT_TRUE(again->already_present);
         EXPECT_EQ(again->commit_sequence, ack->commit_sequence);
@@ -222,16 +208,16 @@ TEST_F(TwoServersTest, ScansAreTakenInByServersThatHaveNotGotTheMap) {
   EXPECT_EQ(db(0).scans().Get({}, kMap, ready.id)->state, ScanState::kIntegrated);
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, ready.id));
   STRATA_EXPECT_OK(db(0).scans().Delete({}, kMap, {"run", kLarge}));  // CheckAll() has others
-  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(1), kMap)), "a");
   CheckAll(0);
 }
 
 // While the dead one's lease lasts, too.
 TEST_F(TwoServersTest, ScansAreTakenInWhileNobodyCanIntegrateThem) {
-  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
-  Note(1, Put(db(0), kMap, 1)->commit_sequence);
-  STRATA_ASSERT_OK(Put(db(1), kMap, 2));
-  Note(2, Put(db(1), kMap, 2)->commit_sequence);
+  STRATA_ASSERT_OK(PutNumbered(db(0), kMap, 1));
+  Note(1, PutNumbered(db(0), kMap, 1)->commit_sequence);
+  STRATA_ASSERT_OK(PutNumbered(db(1), kMap, 2));
+  Note(2, PutNumbered(db(1), kMap, 2)->commit_sequence);
   servers_[0]->Kill();
   PutSomewhere(3, 1);
   CheckAll(1);
@@ -323,7 +309,7 @@ absl::StatusOr<Told> Ask(api::Database& db) {
 
 TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
   for (std::uint64_t sequence = 1; sequence <= 5; ++sequence) {
-    STRATA_ASSERT_OK(Put(db(0), kMap, sequence));
+    STRATA_ASSERT_OK(PutNumbered(db(0), kMap, sequence));
   }
   STRATA_ASSERT_OK(AtRest(db(0), kMap));
   STRATA_ASSERT_OK(Verify(db(0), kMap));
@@ -335,7 +321,7 @@ TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
   EXPECT_EQ(owner.points, kPoints);
   STRATA_ASSERT_OK_AND_ASSIGN(const Told other, Ask(db(1)));
   EXPECT_EQ(owner, other);
-  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(1), kMap)), "a");
   servers_[0]->Kill();
   STRATA_ASSERT_OK_AND_ASSIGN(const Told alone, Ask(db(1)));
   EXPECT_EQ(owner, alone);
@@ -343,7 +329,7 @@ TEST_F(TwoServersTest, EveryServerAnswersReadsAlsoAfterTheOwnerDied) {
 
 // Queued by whichever is asked, run once by the one that has the map, known to all at once.
 TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
-  STRATA_ASSERT_OK(Put(db(0), kMap, 1));
+  STRATA_ASSERT_OK(PutNumbered(db(0), kMap, 1));
   std::set<std::uint64_t> ids;
   std::vector<std::thread> people;
   for (std::size_t person = 0; person < 4; ++person) {
@@ -363,7 +349,7 @@ TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
     });
   }
   for (std::thread& person : people) person.join();
-  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(1), kMap)), "a");
   for (const std::uint64_t id : ids) {
     JobInfo last;
     STRATA_EXPECT_OK(db(id % 2).jobs().Watch({}, kMap, id, [&last](const JobInfo& now) {
@@ -386,7 +372,7 @@ TEST_F(TwoServersTest, JobsAreStartedAtServersThatHaveNotGotTheMap) {
 // Told at whichever server, true at both at once: a job that is told to be cancelled is no more,
 // and one that was running ends, or had ended.
 TEST_F(TwoServersTest, JobsAreCancelledAtServersThatHaveNotGotTheMap) {
-  for (std::uint64_t i = 1; i <= 8; ++i) STRATA_ASSERT_OK(Put(db(i % 2), kMap, i));
+  for (std::uint64_t i = 1; i <= 8; ++i) STRATA_ASSERT_OK(PutNumbered(db(i % 2), kMap, i));
   std::atomic<int> waited = 0;
   std::atomic<int> ran = 0;
   std::vector<std::thread> people;
@@ -419,7 +405,7 @@ TEST_F(TwoServersTest, JobsAreCancelledAtServersThatHaveNotGotTheMap) {
   for (std::thread& person : people) person.join();
   std::printf("%d cancelled before they began, %d later\n", waited.load(), ran.load());
   EXPECT_GT(waited, 0);
-  EXPECT_EQ(MapOwnerOf(Decide(db(1), kMap)), "a");
+  EXPECT_EQ(MapOwnerOf(AskTheOwner(db(1), kMap)), "a");
   // What nobody cancelled runs.
   STRATA_EXPECT_OK(Verify(db(1), kMap));
   STRATA_EXPECT_OK(Verify(db(0), kMap));
@@ -467,14 +453,14 @@ TEST_F(TwoServersTest, AClientWithBothAddressesFindsTheServerThatHasTheMap) {
   STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> both, Connect(options));
   STRATA_ASSERT_OK(both->maps().Create({}, "other", MapParameters()));
   for (std::uint64_t sequence = 1; sequence <= 6; ++sequence) {
-    STRATA_ASSERT_OK(Put(*both, kMap, sequence));
-    STRATA_ASSERT_OK(Put(*both, "other", sequence));
+    STRATA_ASSERT_OK(PutNumbered(*both, kMap, sequence));
+    STRATA_ASSERT_OK(PutNumbered(*both, "other", sequence));
   }
   STRATA_EXPECT_OK(Verify(*both, kMap));
   servers_[0]->Kill();
   for (std::uint64_t sequence = 7; sequence <= 9; ++sequence) {
-    STRATA_ASSERT_OK(Put(*both, kMap, sequence));
-    STRATA_ASSERT_OK(Put(*both, "other", sequence));
+    STRATA_ASSERT_OK(PutNumbered(*both, kMap, sequence));
+    STRATA_ASSERT_OK(PutNumbered(*both, "other", sequence));
   }
   STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, AtRest(*both, kMap));
   EXPECT_EQ(stats.scans, 9U);
@@ -488,7 +474,7 @@ TEST_F(TwoServersTest, AClientOfOneServerUploadsAndWatchesWhereverTheMapIs) {
     server->Await();
     server->Start();
   }
-  STRATA_ASSERT_OK(Insist([&] { return Put(db(0), kMap, 1).status(); }));
+  STRATA_ASSERT_OK(Insist([&] { return PutNumbered(db(0), kMap, 1).status(); }));
   ClientOptions options;
   options.target = servers_[1]->address();
   STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> one, Connect(options));
@@ -515,13 +501,13 @@ TEST_F(TwoServersTest, AClientOfOneServerUploadsAndWatchesWhereverTheMapIs) {
     return mutex.AwaitWithTimeout(absl::Condition(&there), kPatience);
   };
   for (std::uint64_t sequence = 2; sequence <= 5; ++sequence) {
-    STRATA_EXPECT_OK(Put(*one, kMap, sequence));
+    STRATA_EXPECT_OK(PutNumbered(*one, kMap, sequence));
   }
   STRATA_EXPECT_OK(Verify(*one, kMap));
   EXPECT_TRUE(all(5)) << seen.size();
   // The one that was named is gone: home again.
   servers_[0]->Kill();
-  STRATA_EXPECT_OK(Insist([&] { return Put(*one, kMap, 6).status(); }));
+  STRATA_EXPECT_OK(Insist([&] { return PutNumbered(*one, kMap, 6).status(); }));
   EXPECT_TRUE(all(6)) << seen.size();
   watching.stop.Request();
   watcher.join();
@@ -533,7 +519,7 @@ TEST_F(TwoServersTest, AServerThatSaysNothingAnyMoreHoldsUpNobodyForLong) {
   options.target = absl::StrCat(servers_[0]->address(), ",", servers_[1]->address());
   options.keepalive = absl::Seconds(10);
   STRATA_ASSERT_OK_AND_ASSIGN(const std::unique_ptr<api::Database> both, Connect(options));
-  STRATA_ASSERT_OK(Put(*both, kMap, 1));
+  STRATA_ASSERT_OK(PutNumbered(*both, kMap, 1));
   servers_[0]->Signal(SIGSTOP);
   for (int asked = 0; asked < 2; ++asked) {  // one of them is for the silent one
     STRATA_ASSERT_OK_AND_ASSIGN(const MapStats stats, both->maps().Stats({}, kMap));
@@ -578,15 +564,15 @@ TEST_F(TwoServersTest, AFrozenOwnerThatWakesUpWritesNothingMore) {
     for (int robot = 0; robot < 4; ++robot) {
       const std::uint64_t mine = sequence++;
       robots.emplace_back([&, mine] {
-        const auto ack = Put(*servers_[owner]->db(), kMap, mine);
+        const auto ack = PutNumbered(*servers_[owner]->db(), kMap, mine);
         if (ack.ok()) Note(mine, ack->commit_sequence);
       });
     }
     absl::SleepFor(absl::Milliseconds(3));
     servers_[owner]->Signal(SIGSTOP);
     PutSomewhere(sequence++, other);
-    STRATA_EXPECT_OK(Put(db(other), kMap, sequence).status());
-    Note(sequence, Put(db(other), kMap, sequence)->commit_sequence);
+    STRATA_EXPECT_OK(PutNumbered(db(other), kMap, sequence).status());
+    Note(sequence, PutNumbered(db(other), kMap, sequence)->commit_sequence);
     ++sequence;
     servers_[owner]->Signal(SIGCONT);
     for (std::thread& robot : robots) robot.join();

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -11,6 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/common/retry_delay.h"
 #include "core/common/status.h"
 #include "core/storage/storage.h"
 #include "tests/core/storage/contract/storage_contract.h"
@@ -177,6 +179,104 @@ TEST_F(MapContractTest, AttemptsAreKeptByTheirWork) {
   EXPECT_TRUE(attempts[1].under_way);
   STRATA_ASSERT_OK(Commit([&] { return writer().DeleteAttempt(scan); }));
   EXPECT_EQ(reader().ListAttempts()->size(), 1U);
+}
+
+// The numbers of edits that wait.
+std::vector<std::uint64_t> Waiting(StorageReader& reader, std::uint64_t until) {
+  std::vector<std::uint64_t> numbers = {0};
+  while (true) {
+    const auto edit = reader.FindEdit(numbers.back(), until);
+    if (!edit.ok() || !edit->has_value()) break;
+    numbers.push_back((*edit)->number);
+  }
+  numbers.erase(numbers.begin());
+  return numbers;
+}
+
+TEST_F(MapContractTest, EditsWaitUntilTheyAreAnsweredOrWithdrawn) {
+  EditRequest edit;
+  edit.kind = EditKind::kSetLabels;
+  edit.scan = {"run", 7};
+  edit.value = std::string("\0\xFF", 2);
+  std::vector<std::uint64_t> numbers;
+  const auto put = [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(const std::uint64_t number, writer().PutEdit(edit));
+    numbers.push_back(number);
+    return absl::OkStatus();
+  };
+  const absl::Status first = Commit(put);
+  if (storage().number() == 0) {  // who has a store alone asks nobody
+    EXPECT_THAT(first, StatusIs(absl::StatusCode::kUnimplemented, ::testing::_));
+    EXPECT_FALSE(reader().FindEdit(0, 10)->has_value());
+    EXPECT_EQ(*reader().LastEdit(), 0U);
+    return;
+  }
+  STRATA_ASSERT_OK(first);
+  STRATA_ASSERT_OK(Commit(put));
+  STRATA_ASSERT_OK(Commit(put));
+  EXPECT_THAT(Waiting(reader(), numbers[2]), ElementsAre(numbers[0], numbers[1], numbers[2]));
+  EXPECT_THAT(Waiting(reader(), numbers[1]), ElementsAre(numbers[0], numbers[1]));
+  EXPECT_EQ(*reader().LastEdit(), numbers[2]);
+  STRATA_ASSERT_OK(Commit([&] { return writer().BeginEdit(numbers[0]); }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto found, reader().FindEdit(0, numbers[0]));
+  EXPECT_EQ(found->kind, edit.kind);
+  EXPECT_EQ(found->scan, edit.scan);
+  EXPECT_EQ(found->value, edit.value);
+  EXPECT_EQ(found->begun, 1U);
+  EXPECT_FALSE(reader().FindAnswer(numbers[0])->has_value());
+  // All that an answer has comes back.
+  const absl::Status refused =
+      WithRetryDelay(absl::ResourceExhaustedError("no \xFF room"), absl::Milliseconds(250));
+  const auto answer = [&](std::uint64_t number, const absl::Status& what) {
+    return Commit([&] { return writer().AnswerEdit(number, what); });
+  };
+  STRATA_ASSERT_OK(answer(numbers[0], absl::OkStatus()));
+  STRATA_ASSERT_OK(answer(numbers[1], refused));
+  EXPECT_EQ(reader().FindAnswer(numbers[0])->value(), absl::OkStatus());
+  EXPECT_EQ(reader().FindAnswer(numbers[1])->value(), refused);
+  EXPECT_EQ(RetryDelayOf(reader().FindAnswer(numbers[1])->value()), absl::Milliseconds(250));
+  // Once: of two who answer, or of who answers and who withdraws, one is first.
+  EXPECT_THAT(answer(numbers[1], absl::OkStatus()),
+              StatusIs(absl::StatusCode::kAborted, HasSubstr("withdrawn")));
+  bool waited = true;
+  const auto withdraw = [&](std::uint64_t number) {
+    return Commit([&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(waited, writer().WithdrawEdit(number));
+      return absl::OkStatus();
+    });
+  };
+  STRATA_ASSERT_OK(withdraw(numbers[1]));
+  EXPECT_FALSE(waited);
+  STRATA_ASSERT_OK(withdraw(numbers[2]));
+  EXPECT_TRUE(waited);
+  EXPECT_THAT(answer(numbers[2], absl::OkStatus()),
+              StatusIs(absl::StatusCode::kAborted, ::testing::_));
+  Reopen();
+  EXPECT_THAT(Waiting(reader(), numbers[2]), ElementsAre());
+  EXPECT_EQ(*reader().LastEdit(), 0U);
+  EXPECT_EQ(reader().FindAnswer(numbers[1])->value(), refused);
+  STRATA_ASSERT_OK(Commit([&] { return writer().ForgetEdit(numbers[1]); }));
+  for (const std::uint64_t gone : {numbers[1], numbers[2]}) {
+    EXPECT_THAT(reader().FindAnswer(gone), StatusIs(absl::StatusCode::kNotFound, ::testing::_));
+  }
+}
+
+TEST_F(MapContractTest, SoManyEditsWaitAndNoMore) {
+  if (storage().number() == 0) return;
+  std::uint64_t number = 0;
+  const auto put = [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(number, writer().PutEdit({}));
+    return absl::OkStatus();
+  };
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    for (std::uint64_t i = 0; i < kMostEdits; ++i) STRATA_RETURN_IF_ERROR(put());
+    return absl::OkStatus();
+  }));
+  const absl::Status refused = Commit(put);
+  EXPECT_THAT(refused, StatusIs(absl::StatusCode::kResourceExhausted, HasSubstr("retry")));
+  EXPECT_TRUE(RetryDelayOf(refused).has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().AnswerEdit(number, absl::OkStatus()); }));
+  STRATA_EXPECT_OK(Commit(put));
 }
 
 }  // namespace

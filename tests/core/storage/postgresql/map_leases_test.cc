@@ -184,7 +184,8 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
 
 TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
   STRATA_ASSERT_OK(
-      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; ALTER TABLE derived_state DROP "
+      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; DROP TABLE map_edit; ALTER TABLE "
+                    "derived_state DROP "
                     "COLUMN changes_after; UPDATE strata_format SET version = 1"));
   const PostgresMaps a = Server("a");
   STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
@@ -197,8 +198,8 @@ TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
 }
 
 // What waits in kName.
-MATCHER_P2(WaitsWith, scans, jobs, "") {
-  return arg.name == kName && arg.scans == scans && arg.jobs == jobs;
+MATCHER_P3(WaitsWith, scans, jobs, edits, "") {
+  return arg.name == kName && arg.scans == scans && arg.jobs == jobs && arg.edits == edits;
 }
 
 ScanRecord ScanOf(std::uint64_t sequence, std::uint64_t number, std::uint32_t chunks) {
@@ -236,7 +237,7 @@ TEST_F(MapLeasesTest, ScansAreAddedBesideTheOneWhoHasTheMap) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto beside, b.OpenToAdd(kName, 3));
   // By turns, full and relaxed: neither takes the other's commit for a lost one of its own.
   STRATA_ASSERT_OK(PutScanOf(*owner, 1));
-  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, false))));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, false, 0U))));
   STRATA_ASSERT_OK(StageChunk(*beside, 2));
   STRATA_ASSERT_OK(PutScanOf(*beside, 2, 1));
   STRATA_ASSERT_OK(StageChunk(*owner, 3));
@@ -247,7 +248,16 @@ TEST_F(MapLeasesTest, ScansAreAddedBesideTheOneWhoHasTheMap) {
   job.kind = "verify";
   STRATA_ASSERT_OK(
       beside->writer().Commit(Durability::kFull, [&] { return beside->writer().PutJob(job); }));
-  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, true))));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, true, 0U))));
+  std::uint64_t edit = 0;
+  STRATA_ASSERT_OK(beside->writer().Commit(Durability::kFull, [&]() -> absl::Status {
+    STRATA_ASSIGN_OR_RETURN(edit, beside->writer().PutEdit({}));
+    return absl::OkStatus();
+  }));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, true, edit))));
+  STRATA_ASSERT_OK(owner->writer().Commit(
+      Durability::kFull, [&] { return owner->writer().AnswerEdit(edit, absl::OkStatus()); }));
+  EXPECT_THAT(a.ListWaiting(), IsOkAndHolds(ElementsAre(WaitsWith(true, true, 0U))));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, owner->NewReader());
   EXPECT_THAT(reader->ListScanNumbers(), IsOkAndHolds(ElementsAre(1, 2, 3)));
   // There is room for as many as were said to be let wait.

@@ -323,6 +323,8 @@ TEST_F(PostgresStorageTest, TheClockOfADeletedMapIsRemembered) {
 
 TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
   STRATA_ASSERT_OK(PutPiece(1));
+  STRATA_ASSERT_OK(storage_->writer().Commit(
+      Durability::kFull, [&] { return storage_->writer().PutEdit({}).status(); }));
   const std::unique_ptr<StorageReader> reader = Reader();
   STRATA_ASSERT_OK(maps_->Delete(name_));
   EXPECT_THAT(PutPiece(2), StatusIs(absl::StatusCode::kUnavailable, HasSubstr("removed")));
@@ -338,7 +340,7 @@ TEST_F(PostgresStorageTest, ADeletedMapLeavesItsNameAndNoRows) {
       Rows tables,
       other_->Query("SELECT c.table_name::text FROM information_schema.columns AS c WHERE "
                     "c.column_name = 'map' AND c.table_schema = 'public'"));
-  EXPECT_EQ(tables.size(), 40);
+  EXPECT_EQ(tables.size(), 41);
   while (tables.Next()) {
     const std::string sql =
         absl::StrCat("SELECT count(*) FROM ",
@@ -446,6 +448,32 @@ TEST_F(PostgresStorageTest, ChangesAreKeptForAnHour) {
   ASSERT_EQ(clocks.size(), 1U);
   EXPECT_EQ(clocks.front().first, name_);
   EXPECT_EQ(clocks.front().second.commit_sequence, at);
+}
+
+TEST_F(PostgresStorageTest, EditsWaitAndTheirAnswersStayForAnHour) {
+  StorageWriter& writer = storage_->writer();
+  std::uint64_t number = 0;
+  const auto put = [&] {
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&]() -> absl::Status {
+      STRATA_ASSIGN_OR_RETURN(number, writer.PutEdit({}));
+      return absl::OkStatus();
+    }));
+  };
+  put();
+  const std::uint64_t answered = number;
+  STRATA_ASSERT_OK(writer.Commit(
+      Durability::kFull, [&] { return writer.AnswerEdit(answered, absl::AbortedError("no")); }));
+  put();
+  const std::uint64_t waits = number;
+  EXPECT_TRUE(Reader()->FindEdit(0, waits)->has_value());
+  STRATA_ASSERT_OK(other_->Execute("UPDATE map_edit SET made = made - interval '61 minutes'"));
+  EXPECT_FALSE(Reader()->FindEdit(0, waits)->has_value()) << "who asked has given up";
+  STRATA_EXPECT_OK(Reader()->FindAnswer(answered));
+  put();
+  for (const std::uint64_t gone : {answered, waits}) {
+    EXPECT_TRUE(absl::IsNotFound(Reader()->FindAnswer(gone).status()));
+  }
+  EXPECT_TRUE(Reader()->FindEdit(0, number)->has_value());
 }
 
 TEST_F(PostgresStorageTest, ManyMayMakeTheTablesAtTheSameMoment) {
