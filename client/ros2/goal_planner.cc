@@ -100,6 +100,7 @@ absl::Status GoalPlanner::Plan(Drive& drive) {
   STRATA_ASSIGN_OR_RETURN(const Pose T_map_goal, where_.InMap(drive.goal.header.frame));
   drive.to = T_map_goal * Eigen::Vector3d(drive.goal.position_m.data());
   drive.changes = link_.changes();
+  drive.path.inferred = options_.inferred;
   STRATA_ASSIGN_OR_RETURN(drive.path.profile,
                           FindProfile(*database, link_.call(), options_.map, options_.profile));
   STRATA_ASSIGN_OR_RETURN(
@@ -136,6 +137,7 @@ absl::StatusOr<PlanResult> GoalPlanner::PathTo(api::Database& database,
                                                const Eigen::Vector3d& to) const {
   PlanQuery query;
   query.profile = profile;
+  query.inferred = options_.inferred;
   query.from = EndpointAt(from, from.z());
   // RViz points at the plane of height 0, whatever storey it shows: the robot's then, if there is
   // ground at its height.

@@ -103,6 +103,7 @@ void AddOutputs(CLI::App& app, Options& options) {
   app.add_option("--profile", options.profile, "The map's robot profile whose floors and paths")
       ->group(kGroup)
       ->capture_default_str();
+  cli::AddInferred(&app, options.inferred)->group(kGroup);
   app.add_flag("--no-tf",
                options.no_tf,
                "Do not say on /tf where the odometry's frame is in the map: something else does")

@@ -11,6 +11,7 @@
 
 #include "client/cli/terminal/server_options.h"
 #include "core/geometry/pose.h"
+#include "core/world/plan.h"
 
 namespace strata::ros2 {
 
@@ -35,6 +36,7 @@ struct Options {
   // Out.
   std::string map_frame = "map";
   std::string profile = "default";
+  InferredAs inferred = InferredAs::kIgnore;  // by /map and by paths
   std::string map_topic = "/map";
   std::string plan_topic = "/strata/plan";
   std::string pose_topic = "/amcl_pose";

@@ -113,7 +113,7 @@ absl::Status ServerLink::Take(const api::MapUpdate& update) {
   }
   absl::MutexLock lock(&mutex_);
   if (newest != nullptr) correction_ = correction;
-  if (update.whole || !update.tiles.empty()) ++changes_;
+  if (update.whole || update.inferred || !update.tiles.empty()) ++changes_;
   return absl::OkStatus();
 }
 

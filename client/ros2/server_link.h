@@ -61,7 +61,7 @@ class ServerLink {
   // Ends all calls but those that send what waits.
   void EndCalls() const { call_.stop.Request(); }
   Correction correction() const;
-  // Grows with every change of the map's tiles; 0 until they are known.
+  // Grows with every change of the map's tiles, and of what is inferred; 0 until they are known.
   std::uint64_t changes() const;
 
  private:

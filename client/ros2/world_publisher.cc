@@ -108,6 +108,7 @@ absl::Status WorldPublisher::PublishFloor(api::Database& database, const Eigen::
   FloorQuery query;
   query.at = PlanEndpoint{.x_m = place.x(), .y_m = place.y(), .z_m = place.z()};
   query.cells = true;
+  query.inferred = options_.inferred;
   STRATA_ASSIGN_OR_RETURN(query.profile,
                           FindProfile(database, link_.call(), options_.map, options_.profile));
   STRATA_ASSIGN_OR_RETURN(const FloorPlan plan,

@@ -67,6 +67,14 @@ class VoxelBlocks {
  public:
   using Block = std::array<Node, kBlockNodes>;
 
+  VoxelBlocks() = default;
+  VoxelBlocks(const VoxelBlocks& other)
+      : index_(other.index_), keys_(other.keys_), blocks_(other.blocks_) {}
+  VoxelBlocks(VoxelBlocks&&) = default;
+  VoxelBlocks& operator=(VoxelBlocks&&) = default;
+  VoxelBlocks& operator=(const VoxelBlocks&) = delete;
+  ~VoxelBlocks() = default;
+
   std::size_t size() const { return keys_.size(); }
   // In the order in which they were made.
   const std::vector<BlockKey>& keys() const { return keys_; }
@@ -106,7 +114,7 @@ class VoxelBlocks {
   std::vector<BlockKey> keys_;
   std::deque<Block> blocks_;
   BlockKey last_key_;
-  Block* last_ = nullptr;
+  Block* last_ = nullptr;  // of blocks_
 };
 
 }  // namespace strata

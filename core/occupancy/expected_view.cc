@@ -57,11 +57,13 @@ std::vector<Vector3d> DirectionsOf(const FieldOfView& sensor, const Strides& str
 
 ExpectedViews::ExpectedViews(const OccupancyVoxels& grid,
                              const FieldOfView& sensor,
-                             const Eigen::AlignedBox3d& region)
+                             const Eigen::AlignedBox3d& region,
+                             double ground_weight)
     : grid_(grid),
       reader_(grid),
       counted_(region, grid.voxel_m()),
-      max_range_m_(sensor.max_range_m) {
+      max_range_m_(sensor.max_range_m),
+      ground_weight_(ground_weight) {
   const auto beams_of = [&sensor](int most) {
     const Strides strides = StridesFor(sensor, most);
     Beams beams;
@@ -73,6 +75,7 @@ ExpectedViews::ExpectedViews(const OccupancyVoxels& grid,
   };
   all_ = beams_of(sensor.rows * sensor.columns);
   some_ = beams_of(kMostEstimateBeams);
+  few_ = beams_of(kMostGlanceBeams);
   least_odds_ = grid.least_odds();
   for (std::int16_t odds = least_odds_; odds <= grid.most_odds(); ++odds) {
     const double before = OccupancyVoxels::ProbabilityOf(odds);
@@ -102,6 +105,26 @@ double ExpectedViews::WeightAt(const Beams& beams,
   return std::max(1.0, std::min(beams.each, beside));
 }
 
+// Where the next surface below is, if nobody has seen it yet.
+bool ExpectedViews::IsUnderFree(const Vector3i& at) {
+  if (ground_weight_ == 1.0) return false;
+  const std::int16_t above = reader_.Odds(at + Vector3i::UnitZ());
+  return above != OccupancyVoxels::kUnknownOdds && above <= 0;
+}
+
+// Whether a beam goes through an occupied voxel that it enters after a share of its way.
+bool ExpectedViews::Passes(const Vector3i& at,
+                           const Vector3d& from,
+                           const Vector3d& along,
+                           double passed) const {
+  double left = 1.0;
+  for (int i = 0; i < 3; ++i) {
+    if (along[i] == 0.0) continue;
+    left = std::min(left, (at[i] + (along[i] > 0.0 ? 1 : 0) - from[i]) / along[i]);
+  }
+  return reader_.Passes(at, from.z() + passed * along.z(), from.z() + left * along.z());
+}
+
 ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
   BeginView();
   const double voxel_m = grid_.voxel_m();
@@ -110,32 +133,32 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
   ViewGain gain;
   for (const Vector3d& beam : beams.directions) {
     const Vector3d direction = T_map_sensor.linear() * beam;
-    WalkVoxels(from,
-               from + direction * (max_range_m_ / voxel_m),
-               first,
-               [&](const Vector3i& at, double passed) {
-                 if (!grid_.Inside(at)) return false;
-                 const double range_m = passed * max_range_m_;
-                 std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
-                 const std::int16_t odds = reader_.Odds(at);
-                 const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
-                 const bool hit = !unknown && odds > 0;
-                 if (mark != kTaken && mark != view_ && counted_.Contains(at)) {
-                   const std::size_t number = (unknown ? 0 : odds) - least_odds_;
-                   const double weight =
-                       beams.each == 1.0 ? 1.0
-                                         : WeightAt(beams, beam, direction.lpNorm<1>(), range_m);
-                   gain.bits += weight * (hit ? gain_of_hit_ : gain_of_miss_)[number];
-                   if (unknown) gain.volume_m3 += weight * std::pow(voxel_m, 3);
-                 }
-                 if (mark != kTaken) mark = view_;
-                 return !hit;
-               });
+    const Vector3d along = direction * (max_range_m_ / voxel_m);
+    WalkVoxels(from, from + along, first, [&](const Vector3i& at, double passed) {
+      if (!grid_.Inside(at)) return false;
+      const double range_m = passed * max_range_m_;
+      std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
+      const std::int16_t odds = reader_.Odds(at);
+      const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
+      const bool hit = !unknown && odds > 0 && !Passes(at, from, along, passed);
+      if (mark != kTaken && mark != view_ && counted_.Contains(at)) {
+        const std::size_t number = (unknown ? 0 : odds) - least_odds_;
+        const double weight =
+            beams.each == 1.0 ? 1.0 : WeightAt(beams, beam, direction.lpNorm<1>(), range_m);
+        const double worth = unknown && IsUnderFree(at) ? ground_weight_ : 1.0;
+        gain.bits += worth * weight * (hit ? gain_of_hit_ : gain_of_miss_)[number];
+        if (unknown) gain.volume_m3 += weight * std::pow(voxel_m, 3);
+      }
+      if (mark != kTaken) mark = view_;
+      return !hit;
+    });
   }
   return gain;
 }
 
 ViewGain ExpectedViews::Estimate(const Pose& T_map_sensor) { return Look(T_map_sensor, some_); }
+
+ViewGain ExpectedViews::Glance(const Pose& T_map_sensor) { return Look(T_map_sensor, few_); }
 
 ViewGain ExpectedViews::Take(const Pose& T_map_sensor) {
   const ViewGain gain = Look(T_map_sensor, all_);

@@ -29,15 +29,21 @@ struct ViewGain {
 class ExpectedViews {
  public:
   static constexpr int kMostEstimateBeams = 2000;
+  static constexpr int kMostGlanceBeams = 250;
 
-  // `grid` must outlive it; only what is in `region` counts. REQUIRES: a valid sensor.
+  // `grid` must outlive it; only what is in `region` counts, an unknown voxel right below a free
+  // one `ground_weight` times: ground is one layer of voxels, the air over it many. REQUIRES: a
+  // valid sensor.
   ExpectedViews(const OccupancyVoxels& grid,
                 const FieldOfView& sensor,
-                const Eigen::AlignedBox3d& region = OccupancyVoxelsOptions().region);
+                const Eigen::AlignedBox3d& region = OccupancyVoxelsOptions().region,
+                double ground_weight = 1.0);
 
   // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
   // would cross.
   ViewGain Estimate(const Pose& T_map_sensor);
+  // The same from kMostGlanceBeams: what to estimate first.
+  ViewGain Glance(const Pose& T_map_sensor);
   // From all beams. What they cross is thought to be known from then on and gains nothing any more.
   ViewGain Take(const Pose& T_map_sensor);
 
@@ -50,6 +56,11 @@ class ExpectedViews {
   };
 
   void BeginView();
+  bool IsUnderFree(const Eigen::Vector3i& at);
+  bool Passes(const Eigen::Vector3i& at,
+              const Eigen::Vector3d& from,
+              const Eigen::Vector3d& along,
+              double passed) const;
   ViewGain Look(const Pose& T_map_sensor, const Beams& beams);
   double WeightAt(const Beams& beams,
                   const Eigen::Vector3d& direction,
@@ -60,7 +71,8 @@ class ExpectedViews {
   OccupancyReader reader_;
   const VoxelBox counted_;
   const double max_range_m_;
-  Beams all_, some_;
+  const double ground_weight_;
+  Beams all_, some_, few_;
   std::vector<double> gain_of_hit_, gain_of_miss_;  // by odds
   std::int16_t least_odds_ = 0;
   VoxelBlocks<std::uint16_t> seen_;  // the view that did last, or kTaken

@@ -46,6 +46,7 @@ OccupancyVoxels::OccupancyVoxels(const OccupancyVoxelsOptions& options)
       miss_(OddsOf(options.model.miss)),
       least_(OddsOf(options.model.least)),
       most_(OddsOf(options.model.most)),
+      hits_stay_(options.model.hits_stay),
       kept_(options.region, options.voxel_m) {}
 
 void OccupancyVoxels::BeginScan() {
@@ -55,15 +56,16 @@ void OccupancyVoxels::BeginScan() {
 }
 
 absl::Status OccupancyVoxels::Check(const Stop& stop) const {
-  if (voxels_.bytes() <= kMostBytes) return stop.status();
+  if (bytes() <= kMostBytes) return stop.status();
   return absl::ResourceExhaustedError(
       absl::StrFormat("occupancy: more than %d MB; take larger voxels or a smaller region",
                       kMostBytes / 1'000'000));
 }
 
 // True the first time that the scan hits it.
-bool OccupancyVoxels::Hit(const Vector3i& at) {
+bool OccupancyVoxels::Hit(const Vector3i& at, double z) {
   Voxel& voxel = At(at);
+  if (hits_stay_) heights_.FindOrAdd(BlockOf(at))[NodeInBlock(at)].Add(z);
   const auto mark = static_cast<std::uint16_t>(2 * scan_ + 1);
   if (voxel.seen == mark) return false;
   voxel.seen = mark;
@@ -71,12 +73,15 @@ bool OccupancyVoxels::Hit(const Vector3i& at) {
   return true;
 }
 
-void OccupancyVoxels::Miss(const Vector3i& at) {
+// The same of what it looks through.
+bool OccupancyVoxels::Miss(const Vector3i& at) {
   Voxel& voxel = At(at);
   const auto mark = static_cast<std::uint16_t>(2 * scan_);
-  if (voxel.seen >= mark) return;
+  if (hits_stay_ && voxel.odds > 0) heights_.FindOrAdd(BlockOf(at))[NodeInBlock(at)].passed = true;
+  if (voxel.seen >= mark) return false;
   voxel.seen = mark;
   voxel.odds = After(voxel.odds, false);
+  return true;
 }
 
 // Leaves the part over the voxels that are kept; false if there is none.
@@ -95,7 +100,7 @@ bool OccupancyVoxels::Clip(Ray& ray) const {
     end = std::min(end, std::max(a, b));
   }
   if (begin >= end) return false;
-  ray.ends = end == 1.0;
+  ray.ends = ray.hits && end == 1.0;
   ray.to = ray.from + end * along;
   ray.from += begin * along;
   return true;
@@ -103,14 +108,12 @@ bool OccupancyVoxels::Clip(Ray& ray) const {
 
 void OccupancyVoxels::Cast(const Ray& ray) {
   const Vector3i last = VoxelOf(ray.to);
-  WalkVoxels(ray.from,
-             ray.to,
-             VoxelOf(ray.from).cwiseMax(kept_.low).cwiseMin(kept_.high - Vector3i::Ones()),
-             [&](const Vector3i& at, double /*passed*/) {
-               if (!Inside(at) || (ray.ends && at == last)) return false;
-               Miss(at);
-               return true;
-             });
+  WalkVoxels(
+      ray.from, ray.to, Nearest(VoxelOf(ray.from)), [&](const Vector3i& at, double /*passed*/) {
+        if (!Inside(at) || (ray.ends && at == last)) return false;
+        Miss(at);
+        return true;
+      });
 }
 
 absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
@@ -123,8 +126,14 @@ absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (i % kRaysBetweenChecks == 0) STRATA_RETURN_IF_ERROR(Check(stop));
     const Eigen::Vector3f& p = cloud.points[i];
-    if (!p.allFinite() || !sensor.Takes((p - cloud.sensor_origin).cast<double>().norm())) continue;
+    const double range_m = (p - cloud.sensor_origin).cast<double>().norm();
+    const double seen_m = std::min(range_m, sensor.max_range_m);
+    if (!p.allFinite() || !sensor.Takes(seen_m)) continue;
     Ray ray = {from, T_map_scan * (p.cast<double>() + cloud.origin) / voxel_m_};
+    if (range_m > seen_m) {
+      ray.to = from + seen_m / range_m * (ray.to - from);
+      ray.hits = false;
+    }
     if (!Clip(ray)) continue;
     if (std::max(ray.from.cwiseAbs().maxCoeff(), ray.to.cwiseAbs().maxCoeff()) >= kMaxVoxel) {
       return absl::OutOfRangeError(absl::StrFormat(
@@ -137,11 +146,12 @@ absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
           voxel_m_));
     }
     const Vector3i end = VoxelOf(ray.to);
-    if (!ray.ends || !Inside(end) || Hit(end)) rays.push_back(ray);
+    if (!ray.ends || !Inside(end) || Hit(end, ray.to.z())) rays.push_back(ray);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (i % kRaysBetweenChecks == 0) STRATA_RETURN_IF_ERROR(Check(stop));
-    Cast(rays[i]);
+    // Of those that hit nothing, one where they end.
+    if (rays[i].hits || Miss(Nearest(VoxelOf(rays[i].to)))) Cast(rays[i]);
   }
   return Check(stop);
 }

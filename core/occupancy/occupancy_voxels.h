@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -38,12 +39,17 @@ struct InverseSensorModel {
   double miss = 0.4;      // in [least, 0.5)
   double least = 0.1192;  // in [0.01, 0.5)
   double most = 0.971;    // in (0.5, 0.99]
+  // A voxel that was hit stays hit, whatever looks through it, and it is kept at what heights: rays
+  // that graze a floor go through its voxels for metres before they end.
+  bool hits_stay = false;
 
-  // One scan says as much as many: what tells seen from unseen where each place was seen once.
+  // One scan says as much as many, in any order: what tells seen from unseen where each place was
+  // seen once.
   static constexpr InverseSensorModel OfOneLook() {
     InverseSensorModel model;
     model.hit = model.most;
     model.miss = model.least;
+    model.hits_stay = true;
     return model;
   }
 };
@@ -65,9 +71,10 @@ class OccupancyVoxels {
   // REQUIRES: valid options.
   explicit OccupancyVoxels(const OccupancyVoxelsOptions& options);
 
-  // Points that are not finite or that the sensor would not take are left out. OUT_OF_RANGE for
-  // what lies beyond kMaxVoxel, RESOURCE_EXHAUSTED beyond 2 GB, CANCELLED, DEADLINE_EXCEEDED; the
-  // grid is to be thrown away then.
+  // Points that are not finite or nearer than the sensor sees are left out; of one that is farther
+  // than it sees, the ray as far as it does: a beam that nothing came back from is a point beyond
+  // the sensor's range. OUT_OF_RANGE for what lies beyond kMaxVoxel, RESOURCE_EXHAUSTED beyond 2
+  // GB, CANCELLED, DEADLINE_EXCEEDED; the grid is to be thrown away then.
   absl::Status Add(const PointCloud& cloud,
                    const Pose& T_map_scan,
                    const SensorModel& sensor,
@@ -85,16 +92,18 @@ class OccupancyVoxels {
   static constexpr std::int16_t kUnknownOdds = std::numeric_limits<std::int16_t>::max();
   std::int16_t least_odds() const { return least_; }
   std::int16_t most_odds() const { return most_; }
-  // What eq. 4.10 makes of known or unknown odds.
+  // What eq. 4.10 makes of known or unknown odds, or a hit that stays.
   std::int16_t After(std::int16_t odds, bool hit) const {
     const int before = odds == kUnknownOdds ? 0 : odds;
+    if (hits_stay_ && before > 0) return odds;
+    if (hits_stay_ && hit) return hit_;
     return static_cast<std::int16_t>(hit ? std::min(before + hit_, int{most_})
                                          : std::max(before + miss_, int{least_}));
   }
   static double ProbabilityOf(std::int16_t odds);
   // Voxels of which something is known, with their middles in `region`.
   std::size_t CountKnown(const Eigen::AlignedBox3d& region) const;
-  std::size_t bytes() const { return voxels_.bytes(); }
+  std::size_t bytes() const { return voxels_.bytes() + heights_.bytes(); }
 
  private:
   friend class OccupancyReader;
@@ -102,23 +111,41 @@ class OccupancyVoxels {
     std::int16_t odds = 0;
     std::uint16_t seen = 0;  // 2 · scan, and 1 more if that hit it; 1: by an earlier one; 0: never
   };
+  // The heights in a voxel at which rays ended, in 255ths of its edge.
+  struct Heights {
+    std::uint8_t low = 255, high = 0;
+    bool passed = false;  // by others
+
+    void Add(double z) {
+      const auto part = static_cast<std::uint8_t>(std::lround(255.0 * (z - std::floor(z))));
+      low = std::min(low, part);
+      high = std::max(high, part);
+    }
+  };
   struct Ray {
     Eigen::Vector3d from, to;  // [voxels]
+    bool hits = true;          // something, not nothing as far as the sensor sees
     bool ends = true;          // at what was hit, not at the edge of the region
   };
 
   void BeginScan();
   absl::Status Check(const Stop& stop) const;
   Voxel& At(const Eigen::Vector3i& at) { return voxels_.FindOrAdd(BlockOf(at))[NodeInBlock(at)]; }
-  bool Hit(const Eigen::Vector3i& at);
-  void Miss(const Eigen::Vector3i& at);
+  bool Hit(const Eigen::Vector3i& at, double z);
+  bool Miss(const Eigen::Vector3i& at);
   bool Clip(Ray& ray) const;
   void Cast(const Ray& ray);
+  // In the region.
+  Eigen::Vector3i Nearest(const Eigen::Vector3i& at) const {
+    return at.cwiseMax(kept_.low).cwiseMin(kept_.high - Eigen::Vector3i::Ones());
+  }
 
   double voxel_m_;
   std::int16_t hit_, miss_, least_, most_;
+  bool hits_stay_;
   VoxelBox kept_;
   VoxelBlocks<Voxel> voxels_;
+  VoxelBlocks<Heights> heights_;  // of what was hit, where hits stay
   std::uint16_t scan_ = 0;
 };
 
@@ -141,8 +168,22 @@ class OccupancyReader {
     return voxel.seen == 0 ? OccupancyVoxels::kUnknownOdds : voxel.odds;
   }
   double Probability(const Eigen::Vector3i& at) { return OccupancyVoxels::ProbabilityOf(Odds(at)); }
+  // Whether a voxel that is occupied lets a beam pass that is between two heights there [voxels]:
+  // others passed it, and all that ended there did so at about one height, and not at such a one.
+  bool Passes(const Eigen::Vector3i& at, double z_in, double z_out) const {
+    const auto* block = grid_.heights_.Peek(BlockOf(at));
+    if (block == nullptr) return false;
+    const OccupancyVoxels::Heights& heights = (*block)[NodeInBlock(at)];
+    if (!heights.passed || heights.high - heights.low > kMostFloorHeights) return false;
+    const double low = at.z() + (heights.low - 1) / 255.0;
+    const double high = at.z() + (heights.high + 1) / 255.0;
+    return std::max(z_in, z_out) < low || std::min(z_in, z_out) > high;
+  }
 
  private:
+  // A slope of 0.35 and some noise; walls have more [255ths of a voxel].
+  static constexpr int kMostFloorHeights = 100;
+
   const OccupancyVoxels& grid_;
   const VoxelBlocks<OccupancyVoxels::Voxel>::Block* last_ = nullptr;
   BlockKey last_key_;

@@ -58,6 +58,21 @@ absl::StatusOr<PatchId> ReachAll(SearchSpace& space,
                                  const Stop& stop,
                                  std::uint32_t below = kAnyCost);
 
+// Calls visit(patch, cost) for all that is known in `workspace` to cost at most `most`.
+template <typename Visit>
+void ForEachReached(const SearchSpace& space,
+                    SearchWorkspace& workspace,
+                    std::uint32_t most,
+                    const Visit& visit) {
+  for (const int slot : workspace.at_hand()) {
+    const SearchWorkspace::Member& member = workspace.member(slot);
+    const PatchId base = space.slots()[slot].base;
+    member.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
+      if (member.costs[place] <= most) visit(base + place, member.costs[place]);
+    });
+  }
+}
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_PLANNING_SEARCH_H_

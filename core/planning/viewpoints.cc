@@ -39,6 +39,13 @@ constexpr int kHeadings = 8;
 constexpr double kRegionStepM = 10.0;
 constexpr double kRegionStepUpM = 1.0;
 constexpr double kBelowM = 1.0;
+// What a look costs without any way, so that nothing near is worth endlessly much [m].
+constexpr double kLookCostM = 3.0;
+// What a glance may say too little [1, bits].
+constexpr double kGlanceSlack = 1.5;
+constexpr double kGlanceSlackBits = 50.0;
+// So near to each other places see the same [m].
+constexpr double kSameLookM = 0.5;
 constexpr double kAboveM = 1.0;
 
 struct Stand {
@@ -65,17 +72,11 @@ std::vector<Stand> ReachedPlaces(SearchSpace& space,
                                  SearchWorkspace& workspace,
                                  std::uint32_t budget) {
   std::vector<Stand> places;
-  for (const int slot : workspace.at_hand()) {
-    const SearchWorkspace::Member& member = workspace.member(slot);
-    const PatchId base = space.slots()[slot].base;
-    member.tile->standing.ForEach([&](std::uint32_t place, std::uint32_t /*number*/) {
-      const std::uint32_t cost = member.costs[place];
-      if (cost > budget) return;
-      Stand& stand = places.emplace_back();
-      stand.patch = base + place;
-      stand.cost_m = MetresOf(space, cost);
-    });
-  }
+  ForEachReached(space, workspace, budget, [&](PatchId patch, std::uint32_t cost) {
+    Stand& stand = places.emplace_back();
+    stand.patch = patch;
+    stand.cost_m = MetresOf(space, cost);
+  });
   for (Stand& stand : places) stand.place = space.Position(stand.patch);
   std::sort(places.begin(), places.end(), [](const Stand& a, const Stand& b) {
     return std::tuple(a.cost_m, a.place.x(), a.place.y(), a.place.z()) <
@@ -156,13 +157,15 @@ class ViewChooser {
               const Stop& stop)
       : space_(space),
         query_(query),
-        views_(seen.voxels, query.sensor, region),
+        views_(seen.voxels, query.sensor, region, kGroundWeight),
         stands_(std::move(stands)),
         headings_(query.sensor.width_rad < 2.0 * std::numbers::pi - 1e-3 ? kHeadings : 1),
+        looks_(seen.looks),
         stop_(stop) {}
 
   absl::StatusOr<std::vector<ExploreView>> Choose() {
     std::vector<ExploreView> chosen;
+    STRATA_RETURN_IF_ERROR(GlanceAtAll());
     while (chosen.size() < static_cast<std::size_t>(query_.count)) {
       STRATA_ASSIGN_OR_RETURN(const std::size_t best, Best());
       if (best == stands_.size()) break;
@@ -195,16 +198,49 @@ class ViewChooser {
   double UtilityOf(const Stand& stand) const {
     return stand.gain_bits - query_.bits_per_m * stand.cost_m;
   }
+  // Whether a scan was taken from there, more or less, and towards the same side. It has told what
+  // such a look tells: where more is expected, something that nobody saw hides it.
+  bool HasLooked(const Pose& T_map_sensor) const {
+    return std::any_of(looks_.begin(), looks_.end(), [&](const Pose& look) {
+      if ((look.translation() - T_map_sensor.translation()).norm() > kSameLookM) return false;
+      const double turn = look.linear().col(0).dot(T_map_sensor.linear().col(0));
+      return headings_ == 1 || turn >= std::cos(0.5 * query_.sensor.width_rad);
+    });
+  }
+  // What a metre of the way tells.
+  static double RankOf(const Stand& stand) { return stand.gain_bits / (stand.cost_m + kLookCostM); }
+
+  // Calls look(pose, heading) for the ways to look from the stand that were not tried yet.
+  template <typename Look>
+  void ForEachLook(const Stand& stand, const Look& look) const {
+    for (int heading = 0; heading < headings_; ++heading) {
+      const Pose T_map_sensor = PoseAt(stand, heading);
+      if (!HasLooked(T_map_sensor)) look(T_map_sensor, heading);
+    }
+  }
 
   absl::Status Estimate(Stand& stand) {
     STRATA_RETURN_IF_ERROR(stop_.status());
     stand.fresh = true;
-    stand.gain_bits = -1.0;
-    for (int heading = 0; heading < headings_; ++heading) {
-      const double bits = views_.Estimate(PoseAt(stand, heading)).bits;
-      if (bits <= stand.gain_bits) continue;
+    stand.gain_bits = 0.0;
+    ForEachLook(stand, [&](const Pose& T_map_sensor, int heading) {
+      const double bits = views_.Estimate(T_map_sensor).bits;
+      if (bits <= stand.gain_bits) return;
       stand.gain_bits = bits;
       stand.heading = heading;
+    });
+    return absl::OkStatus();
+  }
+
+  // Bounds of all, so that few have to be estimated.
+  absl::Status GlanceAtAll() {
+    for (Stand& stand : stands_) {
+      STRATA_RETURN_IF_ERROR(stop_.status());
+      stand.gain_bits = 0.0;
+      ForEachLook(stand, [&](const Pose& T_map_sensor, int /*heading*/) {
+        const double bits = kGlanceSlack * views_.Glance(T_map_sensor).bits + kGlanceSlackBits;
+        stand.gain_bits = std::max(stand.gain_bits, bits);
+      });
     }
     return absl::OkStatus();
   }
@@ -216,16 +252,17 @@ class ViewChooser {
     std::vector<std::size_t> by_bound(order_.begin() + static_cast<std::ptrdiff_t>(begin),
                                       order_.begin() + static_cast<std::ptrdiff_t>(end));
     std::stable_sort(by_bound.begin(), by_bound.end(), [&](std::size_t a, std::size_t b) {
-      return UtilityOf(stands_[a]) > UtilityOf(stands_[b]);
+      return RankOf(stands_[a]) > RankOf(stands_[b]);
     });
     std::size_t best = stands_.size();
-    double most = query_.min_bits;
+    double most = 0.0;
     for (const std::size_t i : by_bound) {
-      if (UtilityOf(stands_[i]) < most) break;
+      if (best != stands_.size() && RankOf(stands_[i]) <= most) break;
       if (!stands_[i].fresh) STRATA_RETURN_IF_ERROR(Estimate(stands_[i]));
-      const double utility = UtilityOf(stands_[i]);
-      if (utility < most || (utility == most && best != stands_.size())) continue;
-      most = utility;
+      if (UtilityOf(stands_[i]) < query_.min_bits) continue;
+      const double rank = RankOf(stands_[i]);
+      if (best != stands_.size() && rank <= most) continue;
+      most = rank;
       best = i;
     }
     return best;
@@ -275,6 +312,7 @@ class ViewChooser {
   std::vector<Stand> stands_;
   std::vector<std::size_t> order_;
   const int headings_;
+  const std::vector<Pose>& looks_;
   const Stop& stop_;
 };
 
@@ -345,7 +383,7 @@ absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
   result.reason = result.views.empty() ? ExploreReason::kExplored : ExploreReason::kViews;
   result.known_m3 =
       static_cast<double>(seen->voxels.CountKnown(result.region)) * std::pow(query.resolution_m, 3);
-  result.scans = seen->scans;
+  result.scans = seen->looks.size();
   result.scans_left_out = seen->left_out;
   result.message = MessageOf(result, query);
   if (!from.message.empty()) absl::StrAppend(&result.message, "; start ", from.message);

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include <Eigen/Geometry>
 
 #include "core/common/stop.h"
+#include "core/geometry/pose.h"
 #include "core/occupancy/occupancy_voxels.h"
 #include "core/planning/search_space.h"
 #include "core/world/exploration.h"
@@ -19,8 +21,8 @@ namespace strata {
 // What is known of a region.
 struct SeenSpace {
   OccupancyVoxels voxels;
-  std::uint64_t scans = 0;     // whose rays cross it
-  std::uint64_t left_out = 0;  // that may, but whose points are gone or damaged
+  std::vector<Pose> looks = {};  // T_map_sensor of each scan whose rays cross it
+  std::uint64_t left_out = 0;    // that may, but whose points are gone or damaged
 };
 
 // Of a region that has kMaxExploreVoxels at most.
@@ -29,12 +31,16 @@ using SpaceOf = absl::FunctionRef<absl::StatusOr<std::shared_ptr<const SeenSpace
 
 // Between stands that are compared [m].
 inline constexpr double kStandSpacingM = 1.5;
+// How often ground that nobody has seen counts, for robots drive on it (ExpectedViews).
+inline constexpr double kGroundWeight = 10.0;
 
 // Stands are places to stand within the budget, no two closer than kStandSpacingM, the cheapest
-// first; a sensor that does not look all around is turned in eighths. Of the `horizon` nearest the
-// one of the greatest utility EI - λ · cost (eq. 4.15) is taken if it is worth min_bits, else of
-// the next ones; then the robot is thought to be there, and what it would see to be known. Fills
-// all but epoch and elapsed_ms. The same for the same tiles, scans and query.
+// first; a sensor that does not look all around is turned in eighths. Of the `horizon` nearest
+// whose utility EI - λ · cost (eq. 4.15) is worth min_bits the one is taken of which a metre of the
+// way tells most, else of the next ones: the greatest utility itself sends a robot to and fro.
+// Nothing is expected of where a scan was taken already. Then the robot is thought to be there, and
+// what it would see to be known. Fills all but epoch and elapsed_ms. The same for the same tiles,
+// scans and query.
 //   INVALID_ARGUMENT   the query; a start beyond the map's range; a region of more voxels than
 //                      kMaxExploreVoxels, with a resolution that fits
 //   errors of `space`, `space_of` and `stop`

@@ -47,7 +47,7 @@ absl::Status ValidateExploreQuery(const ExploreQuery& query);
 struct ExploreView {
   Pose T_map_sensor;                                // upright
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // on the surface below it
-  // Expected of it, after those before (eq. 4.13).
+  // Expected of it, after those before (eq. 4.13), unseen ground ten times.
   double gain_bits = 0.0;
   double volume_m3 = 0.0;     // unknown space that is known then
   double cost_m = 0.0;        // of the way there from the view before; see PlanResult::cost

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,9 +23,10 @@ inline constexpr int kFloorBlockCells = 8;
 struct FloorBlock {
   std::int32_t x = 0;
   std::int32_t y = 0;
-  std::uint64_t free = 0;      // the robot's centre can be there
-  std::uint64_t occupied = 0;  // something stands there that is higher than a step
-  std::uint64_t ground = 0;    // ground on which the robot cannot stand: steep, or close to an edge
+  std::uint64_t free = 0;  // the robot's centre can be there
+  // Something stands there that is higher than a step, or was inferred to, if that is minded.
+  std::uint64_t occupied = 0;
+  std::uint64_t ground = 0;  // ground on which the robot cannot stand: steep, or close to an edge
 
   friend bool operator==(const FloorBlock&, const FloorBlock&) = default;
 };
@@ -55,12 +57,14 @@ struct FloorQuery {
   double min_area_m2 = 10.0;                      // smaller ones are left out; finite, ≥ 0
   bool cells = false;  // fills Floor::blocks: of the floor at `at`, of number `floor`, or of all
   std::optional<int> floor = std::nullopt;  // of which the cells are told; not beside `at`
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 struct FloorPlan {
   std::vector<Floor> floors;  // the largest first
   std::vector<FloorLink> links;
   std::optional<int> at;  // the floor at FloorQuery::at; none where that is on no floor
+  std::string message;    // for people: what is to be known of what was inferred, else nothing
   double cell_size_m = 0.0;
   std::uint64_t epoch = 0;
   std::uint64_t commit_sequence = 0;  // the state of the map that it is about

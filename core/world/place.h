@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/strings/string_view.h"
@@ -48,11 +49,13 @@ struct PlaceQuery {
   std::optional<int> floor = std::nullopt;
   std::optional<PlanEndpoint> at = std::nullopt;
   bool cells = false;  // fills Place::blocks
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 struct FloorPlaces {
   std::vector<Place> places;  // the largest first
   std::optional<int> floor;   // none where the map has no floor
+  std::string message;        // as of FloorPlan
   double cell_size_m = 0.0;
   std::uint64_t epoch = 0;
   std::uint64_t commit_sequence = 0;  // the state of the map that it is about

@@ -23,6 +23,7 @@ v1::ListPlacesRequest ToProto(absl::string_view map, const PlaceQuery& query) {
   if (query.floor.has_value()) proto.set_floor(*query.floor);
   if (query.at.has_value()) *proto.mutable_at() = EndpointToProto(*query.at);
   proto.set_cells(query.cells);
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -35,6 +36,7 @@ absl::StatusOr<PlaceQuery> FromProto(const v1::ListPlacesRequest& proto) {
     STRATA_ASSIGN_OR_RETURN(query.at, EndpointFromProto("at", proto.at()));
   }
   query.cells = proto.cells();
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   return query;
 }
 
@@ -56,6 +58,7 @@ v1::ListPlacesResponse ToProto(const FloorPlaces& places) {
     }
   }
   if (places.floor.has_value()) proto.set_floor(*places.floor);
+  proto.set_message(places.message);
   proto.set_cell_size_m(places.cell_size_m);
   proto.set_epoch(places.epoch);
   proto.set_commit_sequence(places.commit_sequence);
@@ -81,6 +84,7 @@ absl::StatusOr<FloorPlaces> FromProto(const v1::ListPlacesResponse& proto) {
     }
   }
   if (proto.has_floor()) places.floor = proto.floor();
+  places.message = proto.message();
   places.cell_size_m = proto.cell_size_m();
   places.epoch = proto.epoch();
   places.commit_sequence = proto.commit_sequence();

@@ -344,6 +344,7 @@ v1::ListFloorsRequest ToProto(absl::string_view map, const FloorQuery& query) {
   proto.set_min_area_m2(query.min_area_m2);
   proto.set_cells(query.cells);
   if (query.floor.has_value()) proto.set_floor(*query.floor);
+  proto.set_inferred(ToProto(query.inferred));
   return proto;
 }
 
@@ -357,6 +358,7 @@ absl::StatusOr<FloorQuery> FromProto(const v1::ListFloorsRequest& proto) {
   if (proto.has_min_area_m2()) query.min_area_m2 = proto.min_area_m2();
   query.cells = proto.cells();
   if (proto.has_floor()) query.floor = proto.floor();
+  STRATA_ASSIGN_OR_RETURN(query.inferred, FromProto(proto.inferred()));
   return query;
 }
 
@@ -387,6 +389,7 @@ v1::ListFloorsResponse ToProto(const FloorPlan& plan) {
     out.set_slope_rad(link.slope_rad);
   }
   if (plan.at.has_value()) proto.set_at(*plan.at);
+  proto.set_message(plan.message);
   proto.set_cell_size_m(plan.cell_size_m);
   proto.set_epoch(plan.epoch);
   proto.set_commit_sequence(plan.commit_sequence);
@@ -416,6 +419,7 @@ absl::StatusOr<FloorPlan> FromProto(const v1::ListFloorsResponse& proto) {
     added.slope_rad = link.slope_rad();
   }
   if (proto.has_at()) plan.at = proto.at();
+  plan.message = proto.message();
   plan.cell_size_m = proto.cell_size_m();
   plan.epoch = proto.epoch();
   plan.commit_sequence = proto.commit_sequence();

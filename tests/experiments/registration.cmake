@@ -28,13 +28,3 @@ strata_executable(
   SOURCES path_uncertainty.cc
   DEPS strata::engine strata::posegraph strata::simulator strata::test_support strata::test_recordings
 )
-strata_executable(
-  explore explore
-  SOURCES explore.cc
-  DEPS strata::occupancy strata::test_support strata::test_recordings
-)
-strata_executable(
-  explore_stool explore_stool
-  SOURCES explore_stool.cc
-  DEPS strata::occupancy strata::simulator strata::test_support CLI11::CLI11
-)

@@ -95,6 +95,7 @@ absl::StatusOr<FloorPlan> FloorsOf(Context& context,
   FloorQuery query;
   query.at = options.at;
   query.cells = cells;
+  query.inferred = options.inferred;
   STRATA_ASSIGN_OR_RETURN(query.profile, DriverOf(context, map, options));
   STRATA_ASSIGN_OR_RETURN(FloorPlan plan,
                           context.database.planning().ListFloors(context.call, map, query));
@@ -152,6 +153,7 @@ absl::Status ExportFloors(Context& context,
   if (plan.floors.empty()) return NoFloor(map, plan, 0);
   std::filesystem::path stem = out;
   if (stem.extension() == ".yaml" || stem.extension() == ".pgm") stem.replace_extension();
+  if (!plan.message.empty()) context.output.Talk(plan.message);
   const std::optional<int> one = options.floor.has_value() ? options.floor : plan.at;
   Json written = Json::array();
   for (std::size_t i = 0; i < plan.floors.size(); ++i) {

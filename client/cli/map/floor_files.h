@@ -20,6 +20,7 @@ struct FloorOptions {
   std::string profile = std::string(api::kDefaultProfile);
   std::optional<int> floor;
   std::optional<PlanEndpoint> at;
+  InferredAs inferred = InferredAs::kIgnore;
 };
 
 // --profile, --floor, --at.

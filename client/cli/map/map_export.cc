@@ -225,6 +225,7 @@ constexpr std::pair<const char*, const char*> kFormatsOfOptions[] = {
     {"--floor", "nav2"},
     {"--at", "nav2"},
     {"--mode", "nav2"},
+    {"--inferred", "nav2"},
     {"--profile", "nav2, geotiff, asc"},
     {"--surface", "geotiff, asc"},
     {"--region", "geotiff, asc, octomap, bt"},
@@ -344,6 +345,7 @@ void AddMapExport(Commands& commands, CLI::App* noun) {
       ->check(CLI::IsMember({"traversability", "colour"}))
       ->capture_default_str();
   AddFloorOptions(app, options->floor, true);
+  AddInferred(app, options->floor.inferred);
   app->add_option("--mode",
                   options->mode,
                   "nav2: free, occupied and unknown alone, or with costs where ground was seen "

@@ -54,10 +54,12 @@ absl::Status Floors(Context& context, const FloorsOptions& options) {
     context.output.Object({{"floors", floors},
                            {"links", links},
                            {"at", plan.at.has_value() ? Json(*plan.at) : Json()},
+                           {"message", plan.message},
                            {"epoch", plan.epoch},
                            {"commit_sequence", plan.commit_sequence}});
     return absl::OkStatus();
   }
+  if (!plan.message.empty()) context.output.Talk(plan.message);
   if (plan.floors.empty() && context.output.text()) {
     context.output.Text("no floor: this robot can stand nowhere on 10 m² or more");
     return absl::OkStatus();
@@ -91,6 +93,7 @@ void AddMapFloors(Commands& commands, CLI::App* noun) {
       [options](Context& context) { return Floors(context, *options); });
   AddMapName(app, options->map);
   AddFloorOptions(app, options->floor, false);
+  AddInferred(app, options->floor.inferred);
 }
 
 }  // namespace strata::cli

@@ -46,7 +46,8 @@ absl::Status WritePicture(Context& context,
                           const PlacesOptions& options,
                           const PlaceQuery& query,
                           const FloorPlaces& found) {
-  FloorQuery floors{.profile = query.profile, .cells = true, .floor = found.floor};
+  FloorQuery floors{
+      .profile = query.profile, .cells = true, .floor = found.floor, .inferred = query.inferred};
   STRATA_ASSIGN_OR_RETURN(
       const FloorPlan plan,
       context.database.planning().ListFloors(context.call, options.map, floors));
@@ -64,7 +65,8 @@ absl::Status Places(Context& context, const PlacesOptions& options) {
   PlaceQuery query{.profile = {},
                    .floor = options.floor.floor,
                    .at = options.floor.at,
-                   .cells = !options.out.empty()};
+                   .cells = !options.out.empty(),
+                   .inferred = options.floor.inferred};
   DriverOptions driver;
   driver.profile = options.floor.profile;
   STRATA_ASSIGN_OR_RETURN(query.profile, ProfileOf(context, options.map, driver));
@@ -81,11 +83,13 @@ absl::Status Places(Context& context, const PlacesOptions& options) {
   if (context.output.json()) {
     context.output.Object({{"places", rows},
                            {"floor", found.floor.has_value() ? Json(*found.floor) : Json()},
+                           {"message", found.message},
                            {"file", options.out.empty() ? Json() : Json(options.out)},
                            {"epoch", found.epoch},
                            {"commit_sequence", found.commit_sequence}});
     return absl::OkStatus();
   }
+  if (!found.message.empty()) context.output.Talk(found.message);
   if (found.places.empty() && context.output.text()) {
     context.output.Text("no place: this robot can stand nowhere on 10 m² or more");
     return absl::OkStatus();
@@ -117,6 +121,7 @@ void AddMapPlaces(Commands& commands, CLI::App* noun) {
   AddMapName(app, options->map);
   app->add_option("OUT", options->out, "A PNG file to draw them to")->type_name("FILE.png");
   AddFloorOptions(app, options->floor, true);
+  AddInferred(app, options->floor.inferred);
 }
 
 }  // namespace strata::cli

@@ -32,16 +32,7 @@ void AddDriverOptions(CLI::App* verb, DriverOptions& options) {
                    "or are never crossed; may be given several times")
       ->type_name("CLASS=FACTOR|CLASS=never")
       ->allow_extra_args(false);
-  verb->add_option_function<std::string>(
-          "--inferred",
-          [&options](const std::string& as) {
-            const bool obstacle = as == ToString(InferredAs::kObstacle);
-            options.inferred = obstacle ? InferredAs::kObstacle : InferredAs::kIgnore;
-          },
-          "What objects complete inferred, which nobody saw: keep out of it as of what was "
-          "measured, or not")
-      ->check(CLI::IsMember({"ignore", "obstacle"}))
-      ->default_str("ignore");
+  AddInferred(verb, options.inferred);
 }
 
 absl::StatusOr<ClassCosts> ClassCostsOf(Context& context,

@@ -159,4 +159,18 @@ void AddProfileOptions(CLI::App* app, ProfileOverrides& overrides) {
       "--max-roughness", overrides.max_roughness_m, "Largest sigma around the local plane [m]");
 }
 
+CLI::Option* AddInferred(CLI::App* app, InferredAs& inferred) {
+  return app
+      ->add_option_function<std::string>(
+          "--inferred",
+          [&inferred](const std::string& as) {
+            const bool obstacle = as == ToString(InferredAs::kObstacle);
+            inferred = obstacle ? InferredAs::kObstacle : InferredAs::kIgnore;
+          },
+          "What objects complete inferred, which nobody saw: keep out of it as of what was "
+          "measured, or not")
+      ->check(CLI::IsMember({"ignore", "obstacle"}))
+      ->default_str("ignore");
+}
+
 }  // namespace strata::cli

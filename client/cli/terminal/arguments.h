@@ -67,6 +67,9 @@ struct ProfileOverrides {
 };
 void AddProfileOptions(CLI::App* app, ProfileOverrides& overrides);
 
+// Adds --inferred.
+CLI::Option* AddInferred(CLI::App* app, InferredAs& inferred);
+
 }  // namespace strata::cli
 
 #endif  // STRATA_CLIENT_CLI_TERMINAL_ARGUMENTS_H_

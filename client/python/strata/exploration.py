@@ -19,7 +19,7 @@ class View:
     place: Array
     """(3,) below it, on the surface, map frame [m]."""
     gain_bits: float
-    """Expected to be learnt, after the views before."""
+    """Expected to be learnt, after the views before; ground that nobody has seen counts ten times."""
     volume: float
     """Unknown space that is known then [m³]."""
     cost: float

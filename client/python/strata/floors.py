@@ -62,6 +62,8 @@ class Floors:
     """Of which the answer is."""
     commit_sequence: int
     """The state of the map that the answer is of."""
+    message: str = ""
+    """For people: what is to be known of what was inferred; else empty."""
 
 
 def bits(mask: int) -> Array:
@@ -100,4 +102,4 @@ def from_proto(message: planning_pb2.ListFloorsResponse) -> Floors:
         at=message.at if message.HasField("at") else None,
         cell_size=message.cell_size_m,
         epoch=message.epoch,
-        commit_sequence=message.commit_sequence)
+        commit_sequence=message.commit_sequence, message=message.message)

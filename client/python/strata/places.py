@@ -48,6 +48,8 @@ class Places:
     """Of which the answer is."""
     commit_sequence: int
     """The state of the map that the answer is of."""
+    message: str = ""
+    """For people: what is to be known of what was inferred; else empty."""
 
 
 def _grid(message: planning_pb2.ListPlacesResponse) -> tuple[Array, tuple[float, float]] | tuple[None, None]:
@@ -72,4 +74,4 @@ def from_proto(message: planning_pb2.ListPlacesResponse) -> Places:
                 for place in message.places],
         floor=message.floor if message.HasField("floor") else None,
         grid=grid, origin=origin, cell_size=message.cell_size_m, epoch=message.epoch,
-        commit_sequence=message.commit_sequence)
+        commit_sequence=message.commit_sequence, message=message.message)

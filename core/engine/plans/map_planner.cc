@@ -109,17 +109,20 @@ class MapPlanner::Source final : public TileSource {
     return found == inferred_->tiles.end() ? nullptr : found->second;
   }
   std::uint64_t epoch() const { return state_.view().epoch; }
-  // What whoever asked for what was inferred should know of it, behind a message.
-  std::string RemarkOnInferred() const {
-    if (inferred_ == nullptr || inferred_->epoch == epoch()) return "";
+  // Says behind `message` what whoever asked for what was inferred should know of it.
+  void RemarkOnInferred(std::string& message) const {
+    if (inferred_ == nullptr || inferred_->epoch == epoch()) return;
+    if (!message.empty()) message += "; ";
     if (!inferred_->epoch.has_value()) {
-      return "; nothing is inferred in this map (objects complete)";
+      message += "nothing is inferred in this map (objects complete)";
+      return;
     }
-    return absl::StrCat("; what is inferred is of epoch ",
-                        *inferred_->epoch,
-                        ", the map's is ",
-                        epoch(),
-                        " (objects find and objects complete)");
+    absl::StrAppend(&message,
+                    "what is inferred is of epoch ",
+                    *inferred_->epoch,
+                    ", the map's is ",
+                    epoch(),
+                    " (objects find and objects complete)");
   }
   std::vector<TileKey> Keys() const {
     std::vector<TileKey> keys;
@@ -227,7 +230,7 @@ absl::StatusOr<PlanResult> MapPlanner::Plan(MapState& state,
                                             const Stop& stop) {
   STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(PlanResult result, planner_.Plan(source, query, stop));
-  absl::StrAppend(&result.message, source.RemarkOnInferred());
+  source.RemarkOnInferred(result.message);
   result.epoch = state.view().epoch;
   return result;
 }
@@ -242,7 +245,7 @@ absl::StatusOr<PathCheck> MapPlanner::Check(MapState& state,
   } else {
     STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
     STRATA_ASSIGN_OR_RETURN(check, planner_.Check(source, query, stop));
-    absl::StrAppend(&check.message, source.RemarkOnInferred());
+    source.RemarkOnInferred(check.message);
   }
   check.epoch = state.view().epoch;
   check.commit_sequence = changes.last;
@@ -252,10 +255,11 @@ absl::StatusOr<PathCheck> MapPlanner::Check(MapState& state,
 absl::StatusOr<FloorPlan> MapPlanner::Floors(MapState& state,
                                              const FloorQuery& query,
                                              const Stop& stop) {
-  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state));
+  STRATA_ASSIGN_OR_RETURN(Source source, Source::Of(*this, state, query.inferred, stop));
   STRATA_ASSIGN_OR_RETURN(
       FloorPlan plan,
       FindFloors(planner_.cache(), source, source.Keys(), cell_size_m_, query, stop));
+  source.RemarkOnInferred(plan.message);
   plan.epoch = state.view().epoch;
   plan.commit_sequence = state.changes().last;
   return plan;
@@ -264,11 +268,16 @@ absl::StatusOr<FloorPlan> MapPlanner::Floors(MapState& state,
 absl::StatusOr<FloorPlaces> MapPlanner::Places(MapState& state,
                                                const PlaceQuery& query,
                                                const Stop& stop) {
-  FloorQuery floors{.profile = query.profile, .at = query.at, .cells = true, .floor = query.floor};
+  FloorQuery floors{.profile = query.profile,
+                    .at = query.at,
+                    .cells = true,
+                    .floor = query.floor,
+                    .inferred = query.inferred};
   const bool largest = !query.at.has_value() && !query.floor.has_value();
   if (largest) floors.floor = 0;
   STRATA_ASSIGN_OR_RETURN(const FloorPlan plan, Floors(state, floors, stop));
   FloorPlaces places;
+  places.message = plan.message;
   places.cell_size_m = plan.cell_size_m;
   places.epoch = plan.epoch;
   places.commit_sequence = plan.commit_sequence;
@@ -293,7 +302,7 @@ absl::StatusOr<ExploreResult> MapPlanner::Explore(MapState& state,
     return spaces_.Find(state, region, voxel_m, stop);
   };
   STRATA_ASSIGN_OR_RETURN(ExploreResult result, planner_.Explore(source, query, space_of, stop));
-  absl::StrAppend(&result.message, source.RemarkOnInferred());
+  source.RemarkOnInferred(result.message);
   result.epoch = state.view().epoch;
   return result;
 }
@@ -311,7 +320,7 @@ absl::StatusOr<ShapeCheck> MapPlanner::CheckShape(MapState& state,
                       query,
                       stop,
                       [&source](const TileKey& key) { return source.Inferred(key); }));
-  absl::StrAppend(&check.message, source.RemarkOnInferred());
+  source.RemarkOnInferred(check.message);
   check.epoch = state.view().epoch;
   check.elapsed_ms = absl::ToDoubleMilliseconds(SteadyNow() - begin);
   return check;

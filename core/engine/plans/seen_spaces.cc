@@ -1,9 +1,11 @@
 #include "core/engine/plans/seen_spaces.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -71,18 +73,21 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Find(MapState& stat
                                                                   const Stop& stop) {
   const Eigen::Vector3d low = region.min();
   const Eigen::Vector3d high = region.max();
-  const Key key{{low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m},
-                state.changes().last};
-  if (auto known = known_.Find(key); known != nullptr) return known;
+  const Key key = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z(), voxel_m};
+  const std::uint64_t now = state.changes().last;
+  if (const auto known = known_.Find(key); known != nullptr && known->commit_sequence == now) {
+    return known->space;
+  }
   STRATA_RETURN_IF_ERROR(AwaitTurn(stop));
   const absl::Cleanup done = [this] {
     const absl::MutexLock lock(&mutex_);
     making_ = false;
   };
-  if (auto known = known_.Find(key); known != nullptr) return known;  // made meanwhile
-  STRATA_ASSIGN_OR_RETURN(auto made, Make(state, region, voxel_m, stop));
-  known_.Put(key, made, made->voxels.bytes());
-  return made;
+  const auto known = known_.Find(key);
+  if (known != nullptr && known->commit_sequence == now) return known->space;  // made meanwhile
+  STRATA_ASSIGN_OR_RETURN(auto made, Make(state, region, voxel_m, known.get(), stop));
+  known_.Put(key, made, made->space->voxels.bytes() + made->casts.capacity() * sizeof(Cast));
+  return made->space;
 }
 
 absl::Status SeenSpaces::AwaitTurn(const Stop& stop) {
@@ -96,17 +101,51 @@ absl::Status SeenSpaces::AwaitTurn(const Stop& stop) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(MapState& state,
-                                                                  const Eigen::AlignedBox3d& region,
-                                                                  double voxel_m,
-                                                                  const Stop& stop) {
+bool SeenSpaces::Cast::Is(const PosedScan& posed) const {
+  return number == posed.scan.number && faded_points == posed.scan.faded_points && !left_out &&
+         T_map_scan.matrix() == posed.pose->T_map_scan.matrix();
+}
+
+absl::StatusOr<SeenSpace> SeenSpaces::Begin(const Eigen::AlignedBox3d& region,
+                                            double voxel_m) const {
   OccupancyVoxelsOptions options;
   options.voxel_m = voxel_m;
   options.region = region;
   options.model = InverseSensorModel::OfOneLook();
   STRATA_RETURN_IF_ERROR(options.Validate());
-  auto seen = std::make_shared<SeenSpace>(SeenSpace{OccupancyVoxels(options)});
+  return SeenSpace{OccupancyVoxels(options)};
+}
+
+absl::Status SeenSpaces::Add(ScanSource& source,
+                             const PosedScan& posed,
+                             const Stop& stop,
+                             std::vector<Cast>& casts,
+                             SeenSpace& seen) const {
+  const SensorModel sensor = posed.scan.header.sensor.value_or(parameters_.sensor);
+  const Pose& T_map_scan = posed.pose->T_map_scan;
+  const ScanShare share(caches_, posed.scan);
+  const absl::Status added =
+      source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
+        return seen.voxels.Add(RaysOf(block, source.faded()), T_map_scan, sensor, stop);
+      });
+  const bool left_out = absl::IsDataLoss(added) || absl::IsNotFound(added);
+  if (!left_out) STRATA_RETURN_IF_ERROR(added);
+  casts.push_back({posed.scan.number, posed.scan.faded_points, T_map_scan, left_out});
+  if (!left_out) {
+    seen.looks.push_back(
+        T_map_scan * Pose(Eigen::Translation3d(posed.scan.header.sensor_origin.cast<double>())));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<const SeenSpaces::Known>> SeenSpaces::Make(
+    MapState& state,
+    const Eigen::AlignedBox3d& region,
+    double voxel_m,
+    const Known* before,
+    const Stop& stop) {
   std::vector<PosedScan> scans;
+  std::uint64_t without_points = 0;
   STRATA_ASSIGN_OR_RETURN(const MapState::Loan reader, state.Reader());
   ScanQuery query;
   query.state = ScanState::kIntegrated;
@@ -116,23 +155,28 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(MapState& stat
     if (posed.scan.has_points) {
       scans.push_back(std::move(posed));
     } else {
-      ++seen->left_out;
+      ++without_points;
     }
   }));
-  ScanSource source(*reader, parameters_);
-  for (const PosedScan& posed : scans) {
-    const SensorModel sensor = posed.scan.header.sensor.value_or(parameters_.sensor);
-    const ScanShare share(caches_, posed.scan);
-    const absl::Status added =
-        source.ForEachBlock(posed.scan, [&](const PointCloud& block) -> absl::Status {
-          return seen->voxels.Add(
-              RaysOf(block, source.faded()), posed.pose->T_map_scan, sensor, stop);
-        });
-    const bool left_out = absl::IsDataLoss(added) || absl::IsNotFound(added);
-    if (!left_out) STRATA_RETURN_IF_ERROR(added);
-    ++(left_out ? seen->left_out : seen->scans);
+  auto made = std::make_shared<Known>();
+  made->commit_sequence = state.changes().last;
+  std::optional<SeenSpace> seen;
+  if (before != nullptr && before->casts.size() <= scans.size() &&
+      std::equal(before->casts.begin(),
+                 before->casts.end(),
+                 scans.begin(),
+                 [](const Cast& cast, const PosedScan& posed) { return cast.Is(posed); })) {
+    made->casts = before->casts;
+    seen.emplace(*before->space);
+  } else {
+    STRATA_ASSIGN_OR_RETURN(seen, Begin(region, voxel_m));
   }
-  if (seen->scans == 0 && seen->left_out > 0) {
+  ScanSource source(*reader, parameters_);
+  for (std::size_t i = made->casts.size(); i < scans.size(); ++i) {
+    STRATA_RETURN_IF_ERROR(Add(source, scans[i], stop, made->casts, *seen));
+  }
+  seen->left_out = without_points + scans.size() - seen->looks.size();
+  if (seen->looks.empty() && seen->left_out > 0) {
     return absl::FailedPreconditionError(absl::StrCat(
         "map ",
         name_,
@@ -141,7 +185,8 @@ absl::StatusOr<std::shared_ptr<const SeenSpace>> SeenSpaces::Make(MapState& stat
         " scans around were dropped or are damaged, and without them nothing says what space was "
         "seen; explore needs a map that keeps points (map create without --drop-points)"));
   }
-  return std::shared_ptr<const SeenSpace>(std::move(seen));
+  made->space = std::make_shared<const SeenSpace>(*std::move(seen));
+  return std::shared_ptr<const Known>(std::move(made));
 }
 
 }  // namespace strata

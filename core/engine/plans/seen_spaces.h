@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
@@ -18,7 +18,10 @@
 #include "core/common/lru_cache.h"
 #include "core/common/stop.h"
 #include "core/engine/map/map_state.h"
+#include "core/engine/scans/scan_source.h"
+#include "core/geometry/pose.h"
 #include "core/planning/viewpoints.h"
+#include "core/storage/records.h"
 #include "core/world/map_info.h"
 
 namespace strata {
@@ -40,29 +43,44 @@ class SeenSpaces {
                                                         const Stop& stop);
 
  private:
-  struct Key {
-    std::array<double, 7> numbers;  // region, size of voxels
-    std::uint64_t commit_sequence = 0;
-    friend bool operator==(const Key&, const Key&) = default;
-    template <typename H>
-    friend H AbslHashValue(H h, const Key& key) {
-      return H::combine(std::move(h), key.numbers, key.commit_sequence);
-    }
+  using Key = std::array<double, 7>;  // region, size of voxels
+  // A scan as it was cast.
+  struct Cast {
+    ScanNumber number = 0;
+    std::uint64_t faded_points = 0;
+    Pose T_map_scan = Pose::Identity();
+    bool left_out = false;
+
+    bool Is(const PosedScan& posed) const;
+  };
+  struct Known {
+    std::uint64_t commit_sequence = 0;  // of which it is
+    std::vector<Cast> casts;            // in this order
+    std::shared_ptr<const SeenSpace> space;
   };
 
   // Until nobody makes one; then this does.
   absl::Status AwaitTurn(const Stop& stop);
-  absl::StatusOr<std::shared_ptr<const SeenSpace>> Make(MapState& state,
-                                                        const Eigen::AlignedBox3d& region,
-                                                        double voxel_m,
-                                                        const Stop& stop);
+  // What is known goes on where it is the beginning of what is to be made.
+  absl::StatusOr<std::shared_ptr<const Known>> Make(MapState& state,
+                                                    const Eigen::AlignedBox3d& region,
+                                                    double voxel_m,
+                                                    const Known* before,
+                                                    const Stop& stop);
+  // INVALID_ARGUMENT: the options.
+  absl::StatusOr<SeenSpace> Begin(const Eigen::AlignedBox3d& region, double voxel_m) const;
+  absl::Status Add(ScanSource& source,
+                   const PosedScan& posed,
+                   const Stop& stop,
+                   std::vector<Cast>& casts,
+                   SeenSpace& seen) const;
 
   const std::string name_;
   const MapParameters parameters_;
   const std::shared_ptr<CacheBudget> caches_;
   absl::Mutex mutex_;
   bool making_ ABSL_GUARDED_BY(mutex_) = false;  // one at a time, each of them large
-  LruCache<Key, const SeenSpace> known_;
+  LruCache<Key, const Known> known_;
 };
 
 }  // namespace strata

@@ -16,6 +16,7 @@
 #include "core/common/hash_map.h"
 #include "core/common/status.h"
 #include "core/mls/surface_tile.h"
+#include "core/world/things/inferred_tile.h"
 
 namespace strata {
 namespace {
@@ -103,22 +104,29 @@ class Around {
 
 // What a cell that is not free is, beside a floor of this height.
 void Classify(std::span<const Surface> surfaces,
+              std::span<const InferredSpan> inferred,
               float height_m,
               const ProfileChecks& checks,
               std::uint64_t bit,
               FloorBlock& block) {
+  const auto meets = [&](double bottom_m, float top_m) {
+    return top_m > height_m + checks.step_m && bottom_m < height_m + checks.profile.height_m;
+  };
+  bool occupied = false;
   bool ground = false;
   for (const Surface& surface : surfaces) {
-    if (surface.z_m > height_m + checks.step_m) {
-      if (surface.bottom_m() < height_m + checks.profile.height_m) {
-        block.occupied |= bit;
-        return;
-      }
-    } else if (surface.z_m >= height_m - checks.step_m) {
-      ground = true;
-    }
+    occupied = occupied || meets(surface.bottom_m(), surface.z_m);
+    ground = ground ||
+             (surface.z_m <= height_m + checks.step_m && surface.z_m >= height_m - checks.step_m);
   }
-  if (ground) block.ground |= bit;
+  for (const InferredSpan& span : inferred) {
+    occupied = occupied || meets(span.low_m, span.high_m);
+  }
+  if (occupied) {
+    block.occupied |= bit;
+  } else if (ground) {
+    block.ground |= bit;
+  }
 }
 
 }  // namespace
@@ -147,7 +155,8 @@ absl::StatusOr<std::vector<FloorBlock>> FloorGrid(SearchSpace& space,
     STRATA_RETURN_IF_ERROR(stop.status());
     STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SurfaceTile> tile,
                             space.source().Load(key));
-    if (tile == nullptr) continue;
+    const std::shared_ptr<const InferredTile> inferred = space.source().Inferred(key);
+    if (tile == nullptr && inferred == nullptr) continue;
     for (const auto& [y, x] : of_tile) {
       const Around around(heights, {y, x}, reach);
       const auto own = heights.find({y, x});
@@ -158,7 +167,14 @@ absl::StatusOr<std::vector<FloorBlock>> FloorGrid(SearchSpace& space,
           block.free |= bit;
         } else if (!std::isnan(around.At(cell))) {
           const CellIndex at = {x * kSide + cell % kSide, y * kSide + cell / kSide};
-          Classify(tile->Cell(CellInTile(at)), around.At(cell), checks, bit, block);
+          const std::uint32_t in_tile = CellInTile(at);
+          Classify(tile == nullptr ? std::span<const Surface>() : tile->Cell(in_tile),
+                   inferred == nullptr ? std::span<const InferredSpan>()
+                                       : inferred->Cells(in_tile, in_tile + 1),
+                   around.At(cell),
+                   checks,
+                   bit,
+                   block);
         }
       }
       if ((block.free | block.occupied | block.ground) != 0) blocks.push_back(block);

@@ -73,6 +73,13 @@ class FloorTest(ServerTest):
         with self.assertRaises(strata.InvalidArgument):
             self.map.floors(profile={"radius": float("nan")})
 
+    def test_what_was_inferred_is_minded_if_asked_to(self):
+        self.assertEqual(self.map.floors().message, "")
+        self.assertIn("nothing is inferred", self.map.floors(inferred="obstacle").message)
+        self.assertIn("nothing is inferred", self.map.places(inferred="obstacle").message)
+        with self.assertRaises(ValueError):
+            self.map.floors(inferred="wall")
+
     def test_files_say_what_the_map_says(self):
         self.export("--at", f"0,0,{DECK_M}", "--out", str(self.out / "over.yaml"))
         self.export("--at", "0,0,0", "--out", str(self.out / "under"))

@@ -41,6 +41,11 @@ TEST(Ros2OptionsTest, TheDomainIsThatOfTheEnvironment) {
   unsetenv("ROS_DOMAIN_ID");
 }
 
+TEST(Ros2OptionsTest, WhatWasInferredIsMindedIfAskedTo) {
+  EXPECT_EQ(Parsed({}).inferred, InferredAs::kIgnore);
+  EXPECT_EQ(Parsed({"--inferred", "obstacle"}).inferred, InferredAs::kObstacle);
+}
+
 TEST(Ros2OptionsTest, PosesMayBeTransforms) {
   EXPECT_THAT(ValidateOptions(Parsed({"--poses-from", "tf:odom->base_link"})), IsOk());
 }

@@ -85,7 +85,9 @@ ViewGain StepByStep(const OccupancyVoxels& grid, const FieldOfView& sensor, cons
         if (!grid.Inside(at)) break;
         const double before = reader.Probability(at);
         const bool unknown = reader.Odds(at) == OccupancyVoxels::kUnknownOdds;
-        const bool hit = before > 0.5;
+        const double z = (pose.translation() + range * along).z() / kVoxelM;
+        const double z_next = z + kVoxelM / 60 * along.z() / kVoxelM;
+        const bool hit = before > 0.5 && !reader.Passes(at, z, z_next);
         if (counted.insert({at.x(), at.y(), at.z()}).second) {
           const double after = OccupancyVoxels::ProbabilityOf(grid.After(reader.Odds(at), hit));
           gain.bits += InformationGainBits(before, after);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,7 +38,7 @@ TEST(InformationTest, EntropyIsOneWhereNothingIsKnown) {
 // Scans that end in a voxel or go through it, as drawn, in eq. 4.10 with clamps.
 TEST(OccupancyVoxelsTest, OddsAddUpAsTheThesisSays) {
   for (const InverseSensorModel& model :
-       {InverseSensorModel(), InverseSensorModel::OfOneLook(), InverseSensorModel{.hit = 0.9}}) {
+       {InverseSensorModel(), InverseSensorModel{.miss = 0.1192}, InverseSensorModel{.hit = 0.9}}) {
     std::mt19937 random(3);
     OccupancyVoxelsOptions options;
     options.model = model;
@@ -99,6 +100,45 @@ TEST(OccupancyVoxelsTest, ProbabilitiesAreOctoMaps) {
   // Theirs casts rays to the middles of voxels, ours to the points themselves.
   EXPECT_LT(differ, known / 20);
   RecordProperty("differ", static_cast<int>(differ));
+}
+
+// As where rays graze a floor: some end in a voxel, others go through it above. In any order.
+TEST(OccupancyVoxelsTest, WhatWasHitStaysAndLetsPassAboveWhereItWasHit) {
+  PointCloud end;
+  end.points = {{1.05F, 0.05F, 0.01F}};
+  PointCloud pass;
+  pass.points = {{3.05F, 0.05F, 0.08F}};
+  OccupancyVoxelsOptions options;
+  options.model = InverseSensorModel::OfOneLook();
+  for (const auto& clouds : {std::vector<PointCloud>{end, pass, pass, pass},
+                             std::vector<PointCloud>{pass, pass, end, pass}}) {
+    OccupancyVoxels grid(options);
+    for (const PointCloud& cloud : clouds) {
+      STRATA_ASSERT_OK(grid.Add(cloud, Pose::Identity(), {}, Stop()));
+    }
+    OccupancyReader reader(grid);
+    EXPECT_GT(reader.Probability({10, 0, 0}), 0.95);
+    EXPECT_LT(reader.Probability({20, 0, 0}), 0.15);
+    EXPECT_TRUE(reader.Passes({10, 0, 0}, 0.5, 0.6));
+    EXPECT_FALSE(reader.Passes({10, 0, 0}, 0.5, 0.05));  // down to where it was hit
+    EXPECT_FALSE(reader.Passes({30, 0, 0}, 0.1, 0.2));   // an end that nothing passed
+  }
+}
+
+TEST(OccupancyVoxelsTest, BeyondTheSensorsRangeARayTellsOfFreeSpaceUpToIt) {
+  OccupancyVoxels grid{OccupancyVoxelsOptions()};
+  SensorModel sensor;
+  sensor.min_range_m = 0.5;
+  sensor.max_range_m = 2.0;
+  PointCloud cloud;
+  cloud.points = {{7.0F, 0.05F, 0.05F}, {0.05F, 0.3F, 0.05F}, {0.0F, 0.0F, 1.0F}};
+  STRATA_ASSERT_OK(grid.Add(cloud, Pose(Eigen::Translation3d(0.05, 0.05, 0.05)), sensor, Stop()));
+  OccupancyReader reader(grid);
+  for (int x = 0; x < 20; ++x) EXPECT_LT(reader.Probability({x, 0, 0}), 0.5) << x;
+  EXPECT_EQ(reader.Odds({21, 0, 0}), OccupancyVoxels::kUnknownOdds);
+  EXPECT_EQ(reader.Odds({70, 1, 1}), OccupancyVoxels::kUnknownOdds);
+  EXPECT_EQ(reader.Odds({0, 2, 0}), OccupancyVoxels::kUnknownOdds);  // nearer than it sees
+  EXPECT_GT(reader.Probability({0, 0, 10}), 0.5);
 }
 
 TEST(OccupancyVoxelsTest, ModelsOutOfRangeAreNamed) {

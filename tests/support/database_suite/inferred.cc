@@ -118,6 +118,59 @@ TEST_P(DatabaseSuite, PlansGoRoundWhatWasInferredIfAskedTo) {
   EXPECT_NEAR(lifted.length_m, through.length_m, 0.2);
 }
 
+// Cells of the largest floor within a box, by what they are.
+struct CellCounts {
+  int free = 0, occupied = 0;
+};
+
+CellCounts CellsWithin(const FloorPlan& plan, const Eigen::AlignedBox2d& box) {
+  CellCounts counts;
+  for (const FloorBlock& block : plan.floors.at(0).blocks) {
+    for (int cell = 0; cell < 64; ++cell) {
+      const Eigen::Vector2d middle(block.x * 8 + cell % 8 + 0.5, block.y * 8 + cell / 8 + 0.5);
+      if (!box.contains(middle * plan.cell_size_m)) continue;
+      counts.free += static_cast<int>(block.free >> cell & 1U);
+      counts.occupied += static_cast<int>(block.occupied >> cell & 1U);
+    }
+  }
+  return counts;
+}
+
+TEST_P(DatabaseSuite, FloorsAndPlacesHaveWhatWasInferredIfAskedTo) {
+  PutWholeAndHalf(db());
+  PutWalls(db());
+  FloorQuery query = {.profile = Narrow(), .min_area_m2 = 1.0, .cells = true};
+  query.inferred = InferredAs::kObstacle;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan none, db().planning().ListFloors({}, kMap, query));
+  EXPECT_THAT(none.message, HasSubstr("nothing is inferred in this map"));
+  Complete(db());
+  // Around what was inferred in the gap of the walls.
+  const Eigen::AlignedBox2d gap(Eigen::Vector2d(2.5, -1.85), Eigen::Vector2d(2.9, -1.5));
+  query.inferred = InferredAs::kIgnore;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan open, db().planning().ListFloors({}, kMap, query));
+  EXPECT_THAT(open.message, IsEmpty());
+  query.inferred = InferredAs::kObstacle;
+  STRATA_ASSERT_OK_AND_ASSIGN(const FloorPlan shut, db().planning().ListFloors({}, kMap, query));
+  EXPECT_THAT(shut.message, IsEmpty());
+  ASSERT_THAT(open.floors, Not(IsEmpty()));
+  ASSERT_THAT(shut.floors, Not(IsEmpty()));
+  EXPECT_GT(CellsWithin(open, gap).free, 0);
+  EXPECT_EQ(CellsWithin(shut, gap).free, 0);
+  EXPECT_GT(CellsWithin(shut, gap).occupied, CellsWithin(open, gap).occupied);
+  PlaceQuery places = {.profile = Narrow(), .at = PlanEndpoint{.x_m = 2.7, .y_m = -2.6}};
+  const auto area = [&](InferredAs as) {
+    places.inferred = as;
+    const absl::StatusOr<FloorPlaces> found = db().planning().ListPlaces({}, kMap, places);
+    STRATA_EXPECT_OK(found);
+    double area_m2 = 0.0;
+    for (const Place& place : found.ok() ? found->places : std::vector<Place>()) {
+      area_m2 += place.area_m2;
+    }
+    return area_m2;
+  };
+  EXPECT_LT(area(InferredAs::kObstacle), area(InferredAs::kIgnore));
+}
+
 // Takes what watchers are told.
 template <typename T>
 class Heard {

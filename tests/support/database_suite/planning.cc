@@ -114,6 +114,48 @@ TEST_P(DatabaseSuite, ExploresWhatNoScanSaw) {
   EXPECT_THAT(none.message, HasSubstr("explored"));
 }
 
+// What is kept of a region goes on with the scans that came since, and only while they are the
+// same.
+TEST_P(DatabaseSuite, ExploringAgainIsAsExploringFirst) {
+  ExploreQuery query;
+  query.from.x_m = -2.0;
+  query.count = 3;
+  query.sensor.max_range_m = 6.0;
+  query.min_bits = 20.0;
+  const auto explored = [&] {
+    absl::StatusOr<ExploreResult> result = db().planning().Explore({}, kMap, query);
+    STRATA_EXPECT_OK(result);
+    return result.ok() ? *std::move(result) : ExploreResult();
+  };
+  const auto is_as_anew = [&] {
+    const ExploreResult kept = explored();
+    Reopen();
+    const ExploreResult anew = explored();
+    EXPECT_EQ(kept.known_m3, anew.known_m3);
+    EXPECT_EQ(kept.scans, anew.scans);
+    ASSERT_EQ(kept.views.size(), anew.views.size());
+    for (std::size_t i = 0; i < kept.views.size(); ++i) {
+      EXPECT_EQ(kept.views[i].place, anew.views[i].place);
+      EXPECT_EQ(kept.views[i].gain_bits, anew.views[i].gain_bits);
+    }
+  };
+  PutFloor(db(), {"run", 1});
+  const ExploreResult first = explored();
+  const PointCloud beside = LevelFloor();
+  for (const double x_m : {3.0, 8.0}) {
+    const ScanHeader header = FloorHeader({"run", x_m > 5.0 ? 3U : 2U}, beside, x_m);
+    STRATA_ASSERT_OK(UploadScan(db(), kMap, header, beside));
+    AwaitIntegration(db(), kMap);
+    query.region = first.region;
+    const ExploreResult next = explored();
+    EXPECT_GT(next.known_m3, first.known_m3);
+  }
+  is_as_anew();
+  STRATA_ASSERT_OK(db().scans().Delete({}, kMap, {"run", 2}));
+  AwaitIntegration(db(), kMap);
+  is_as_anew();
+}
+
 TEST_P(DatabaseSuite, ExploringWhereThatIsNotPossibleSaysWhy) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult empty, db().planning().Explore({}, kMap, {}));
   EXPECT_EQ(empty.reason, ExploreReason::kStartNotOnSurface);

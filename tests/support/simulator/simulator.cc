@@ -80,10 +80,13 @@ PointCloud SimulateScan(const Scene& scene,
       const auto hit = scene.Trace(
           T_world_sensor.translation(), T_world_sensor.linear() * beam, sensor.max_range_m);
       const bool seen = hit.has_value() && hit->range >= sensor.min_range_m;
-      if (!seen && !sensor.organised) continue;
+      const bool told = !hit.has_value() && sensor.no_return_m > 0.0;
+      if (!seen && !told && !sensor.organised) continue;
       if (seen) {
         const double sigma = sensor.sigma_m + sensor.sigma_per_metre * hit->range;
         cloud.points.emplace_back(((hit->range + sigma * random.Gaussian()) * beam).cast<float>());
+      } else if (told) {
+        cloud.points.emplace_back((sensor.no_return_m * beam).cast<float>());
       } else {
         cloud.points.emplace_back(
             Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));

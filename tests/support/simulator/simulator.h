@@ -35,6 +35,8 @@ struct SensorOptions {
   double max_range_m = 60.0;
   double sigma_m = 0.01;  // Gaussian, along the beam
   double sigma_per_metre = 0.0005;
+  // Where beams that meet nothing within max_range_m are said to end; 0: nothing is said of them.
+  double no_return_m = 0.0;
   bool organised = false;  // rows = rings from below, NaN where nothing came back
   bool labelled = false;   // PointCloud::label is that of the solids
 };

@@ -70,27 +70,28 @@ class Planning(MapCalls):
                 await self._connection.wait(backoff, failure)
 
     async def floors(self, at: ArrayLike | None = None, *, profile: ProfileLike = None, min_area: float = 10.0,
-                     cells: bool = False) -> Floors:
+                     cells: bool = False, inferred: str = "ignore") -> Floors:
         """Floors: what a robot can drive in one go without ever being above itself, and the links between them.
 
         at: (x, y, z) or (x, y), map frame [m]: whose floor is Floors.at. profile: as for plan. min_area: smaller ones are
-        left out [m²]. cells: also the grid of the floor at `at`, or of all of them.
+        left out [m²]. cells: also the grid of the floor at `at`, or of all of them. inferred: as for plan; "obstacle" is
+        OCCUPIED in grids.
         """
         request = planning_pb2.ListFloorsRequest(
             map=self.name, at=None if at is None else plan.endpoint(at), profile=await self._profile(profile),
-            min_area_m2=min_area, cells=cells)
+            min_area_m2=min_area, cells=cells, inferred=plan.inferred_as(inferred))
         return floors.from_proto(await self._connection.unary(self._planning.ListFloors, request))
 
     async def places(self, floor: int | None = None, *, at: ArrayLike | None = None, profile: ProfileLike = None,
-                     cells: bool = False) -> Places:
+                     cells: bool = False, inferred: str = "ignore") -> Places:
         """Places: rooms, corridors and doorways of one floor, the largest first, and which of them touch.
 
         floor: its number as floors() has them; at: (x, y, z) or (x, y) on it [m]; without both, the largest. profile: as for
-        plan. cells: also which cell is of which place. NotFound: no such floor. ResourceExhausted: it is too large.
+        plan. cells: also which cell is of which place. inferred: as for plan. NotFound: no such floor. ResourceExhausted: it is too large.
         """
         request = planning_pb2.ListPlacesRequest(
             map=self.name, floor=floor, at=None if at is None else plan.endpoint(at),
-            profile=await self._profile(profile), cells=cells)
+            profile=await self._profile(profile), cells=cells, inferred=plan.inferred_as(inferred))
         return places.from_proto(await self._connection.unary(self._planning.ListPlaces, request))
 
     async def explore(self, /, start: ArrayLike, *, count: int = 5, profile: ProfileLike = None,

@@ -20,8 +20,10 @@ namespace {
 using ::strata::testing::IsOk;
 using ::strata::testing::StatusIs;
 using ::testing::_;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Return;
+using ::testing::SizeIs;
 using Code = absl::StatusCode;
 
 class MapCommandsTest : public CommandsTest {};
@@ -234,6 +236,49 @@ TEST_F(MapCommandsTest, PlacesAreToldAndDrawn) {
   plan.floors[0].blocks = {{0, 0, ~std::uint64_t{0}, 0, 0}, {1, 0, 0, 0xFF, 0xFF00}};
   EXPECT_THAT(Run({"map", "places", "m", file}), IsOk());
   EXPECT_GT(std::filesystem::file_size(file), 100U);
+}
+
+TEST_F(MapCommandsTest, FloorsAndPlacesMindWhatWasInferredIfAskedTo) {
+  ON_CALL(db_.planning(), ListProfiles(_, _)).WillByDefault([](auto&, auto) {
+    return absl::StatusOr<std::map<std::string, RobotProfile>>({{"default", RobotProfile()}});
+  });
+  std::vector<InferredAs> asked;
+  ON_CALL(db_.planning(), ListFloors(_, _, _)).WillByDefault([&](auto&, auto, const FloorQuery& q) {
+    asked.push_back(q.inferred);
+    FloorPlan plan;
+    plan.floors.resize(1);
+    plan.floors[0].blocks = {{0, 0, ~std::uint64_t{0}, 0, 0}};
+    plan.message = "nothing is inferred";
+    plan.cell_size_m = 0.1;
+    return absl::StatusOr<FloorPlan>(plan);
+  });
+  ON_CALL(db_.planning(), ListPlaces(_, _, _)).WillByDefault([&](auto&, auto, const PlaceQuery& q) {
+    asked.push_back(q.inferred);
+    FloorPlaces found;
+    found.places = {{PlaceKind::kRoom, 0.64, {0, 0}, {1, 1}, {0, 0}, {}, {{0, 0, 1}}}};
+    found.floor = 0;
+    found.cell_size_m = 0.1;
+    found.message = "nothing is inferred here";
+    return absl::StatusOr<FloorPlaces>(found);
+  });
+  const ::strata::testing::TempDir dir;
+  const std::string out = (dir.path() / "m").string();
+  EXPECT_EQ(RunJson({"map", "floors", "m", "--inferred", "obstacle"})["message"],
+            "nothing is inferred");
+  EXPECT_EQ(RunJson({"map", "places", "m", out + ".png", "--inferred", "obstacle"})["message"],
+            "nothing is inferred here");
+  EXPECT_THAT(
+      Run({"map", "export", "m", "--format", "nav2", "--inferred", "obstacle", "--out", out}),
+      IsOk());
+  EXPECT_THAT(talk_.str(), HasSubstr("nothing is inferred"));
+  EXPECT_THAT(asked, SizeIs(4));  // the picture of places, too
+  EXPECT_THAT(asked, Each(InferredAs::kObstacle));
+  asked.clear();
+  RunText({"map", "floors", "m"});
+  EXPECT_THAT(asked, Each(InferredAs::kIgnore));
+  EXPECT_THAT(
+      Run({"map", "export", "m", "--format", "ply", "--inferred", "obstacle", "--out", "x"}),
+      StatusIs(Code::kInvalidArgument, HasSubstr("nav2")));
 }
 
 }  // namespace
