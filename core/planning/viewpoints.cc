@@ -107,17 +107,16 @@ std::vector<Stand> ThinnedOut(const std::vector<Stand>& places) {
   return stands;
 }
 
-// All that the sensor may see.
-AlignedBox3d SightOf(const std::vector<Stand>& stands, const ExploreQuery& query) {
+// Around the sensor at all stands.
+AlignedBox3d SensorsOf(const std::vector<Stand>& stands, const ExploreQuery& query) {
   AlignedBox3d box;
   for (const Stand& stand : stands) {
     box.extend(stand.place + query.sensor_height_m * Vector3d::UnitZ());
   }
-  const Vector3d range = Vector3d::Constant(query.sensor.max_range_m);
-  return {box.min() - range, box.max() + range};
+  return box;
 }
 
-// The part of it that is looked at where nobody says which.
+// What is looked at where nobody says which.
 AlignedBox3d RegionAround(const std::vector<Stand>& stands, const ExploreQuery& query) {
   AlignedBox3d box;
   for (const Stand& stand : stands) box.extend(stand.place);
@@ -361,9 +360,14 @@ absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
   result.region_m3 = result.region.volume();
   AlignedBox3d around = result.region;
   if (query.region.has_value()) {
+    // What may hide something lies between sensors and the region.
     const Vector3d range = Vector3d::Constant(query.sensor.max_range_m);
-    around = SightOf(stands, query)
-                 .intersection({result.region.min() - range, result.region.max() + range});
+    const AlignedBox3d sensors = SensorsOf(stands, query);
+    const AlignedBox3d in_sight(sensors.min() - range, sensors.max() + range);
+    around = sensors.merged(around)
+                 .intersection({around.min() - range, around.max() + range})
+                 .intersection(in_sight);
+    if (!in_sight.intersects(result.region)) around.setEmpty();
   }
   if (around.isEmpty() || around.volume() <= 0.0) {
     result.reason = ExploreReason::kExplored;

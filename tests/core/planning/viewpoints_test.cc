@@ -215,9 +215,11 @@ TEST(ViewpointsTest, LaterViewsAreWorthLess) {
 
 TEST(ViewpointsTest, AHorizonPrefersWhatIsNear) {
   World world;
-  for (double x = 2.0; x < 12.0; x += 2.0) world.See({x, 4.0, 1.0}, 12.0);
+  world.See({4.0, 4.0, 1.0});
   ExploreQuery query = Query(4.0, 4.0);
   query.count = 1;
+  query.region = {Vector3d(20.0, 0.0, -0.4), Vector3d(24.0, 8.0, 1.0)};
+  query.sensor.max_range_m = 20.0;
   query.bits_per_m = 0.0;
   query.min_bits = 1.0;
   STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult far, world.Explore(query));
