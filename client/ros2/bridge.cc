@@ -113,9 +113,14 @@ absl::StatusOr<Summary> RunBridge(const Options& options, const Stop& stop, Talk
                       where,
                       writers.pose,
                       talk);
-    GoalPlanner planner({options.map, options.profile}, link, where, writers.plan, talk);
-    const WorldPublisher world(
-        {options.map, options.profile}, link, where, writers.map, writers.surfaces, talk);
+    GoalPlanner planner(
+        {options.map, options.profile, options.inferred}, link, where, writers.plan, talk);
+    const WorldPublisher world({options.map, options.profile, options.inferred},
+                               link,
+                               where,
+                               writers.map,
+                               writers.surfaces,
+                               talk);
     Pump pump(options,
               {.node = *node,
                .transform_writer = writers.transforms,

@@ -30,6 +30,7 @@ class GoalPlanner {
  public:
   struct Options {
     std::string map, profile;
+    InferredAs inferred = InferredAs::kIgnore;
   };
   // All outlive it.
   GoalPlanner(const Options& options,

@@ -19,6 +19,7 @@
 #include "client/ros2/where.h"
 #include "core/api/database.h"
 #include "core/common/stop.h"
+#include "core/world/plan.h"
 #include "core/world/robot_profile.h"
 
 namespace strata::ros2 {
@@ -34,6 +35,7 @@ class WorldPublisher {
  public:
   struct Options {
     std::string map, profile;
+    InferredAs inferred = InferredAs::kIgnore;
   };
   // All outlive it.
   WorldPublisher(const Options& options,
