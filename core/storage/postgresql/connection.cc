@@ -278,7 +278,9 @@ absl::Status Connection::StatusOf(const pg_result* result) {
   const char* primary =
       result == nullptr ? nullptr : PQresultErrorField(result, PG_DIAG_MESSAGE_PRIMARY);
   const std::string message = OneLine(primary == nullptr ? PQerrorMessage(connection_) : primary);
-  if (code.empty() && !IsBroken()) {  // libpq's own: memory, say
+  // libpq's own: memory, say. Where it could not send it says that the server is gone before it
+  // knows that the connection is.
+  if (code.empty() && PQconsumeInput(connection_) == 1 && !IsBroken()) {
     return absl::ResourceExhaustedError(absl::StrCat("store: ", message));
   }
   return absl::Status(CodeOfSqlState(code),
