@@ -174,6 +174,7 @@ OccupancyVoxels NewGrid(const Eigen::AlignedBox3d& region) {
   OccupancyVoxelsOptions options;
   options.voxel_m = kCellM;
   options.model = InverseSensorModel::OfOneLook();
+  options.model.hits_stay = false;  // the thesis' model: cells here are fine, and beams not grazing
   options.region = region;
   return OccupancyVoxels(options);
 }
