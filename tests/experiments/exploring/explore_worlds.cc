@@ -57,6 +57,7 @@ constexpr double kFollowM = 0.1;  // between poses that are looked at
 constexpr double kTruthSpacingM = 2.0;
 constexpr double kSensorHeightM = 1.0;
 constexpr double kStartM = 2.5;
+constexpr double kLeastUpright = 0.9;  // cosine of a robot's tilt, beyond its steepest slope
 constexpr int kMostViews = 150;
 constexpr double kLeastReached = 0.95;
 constexpr double kMostTours = 1.3;
@@ -84,6 +85,10 @@ SensorOptions TruthSensor() {
   sensor.sigma_m = 0.002;
   sensor.sigma_per_metre = 0.0;
   return sensor;
+}
+
+Pose Above(const Vector3d& ground) {
+  return Pose(Eigen::Translation3d(ground + kSensorHeightM * Vector3d::UnitZ()));
 }
 
 // Of one map.
@@ -121,11 +126,16 @@ class Mapper {
   // Scans on the way and at its end, but not where it begins.
   absl::Status DriveAlong(const std::vector<Vector3d>& waypoints) {
     const std::vector<Pose> poses = Drive(scene_, waypoints, kFollowM, kSensorHeightM);
+    const std::vector<Pose> ground = Drive(scene_, waypoints, kFollowM, 0.0);
     const auto every = static_cast<std::size_t>(kStepM / kFollowM);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       if ((i == 0 || i % every != 0) && i + 1 != poses.size()) continue;
-      STRATA_RETURN_IF_ERROR(Scan(poses[i]));
+      // Drive()'s wheels are a metre apart and fall off the ramp where this robot stands at its
+      // edge.
+      const bool falls = poses[i].linear()(2, 2) < kLeastUpright;
+      STRATA_RETURN_IF_ERROR(Scan(falls ? Above(ground[i].translation()) : poses[i]));
     }
+    if (poses.empty()) STRATA_RETURN_IF_ERROR(Scan(Above(waypoints.back())));  // it is there
     driven_m_ += LengthOf(waypoints);
     return AwaitIntegrated();
   }
@@ -311,8 +321,7 @@ absl::StatusOr<bool> Draw(const std::string& name,
   const auto [start, ahead] = DrawStart(task, random);
   Mapper mapper(*db, kExplored, task.site.world.scene, SensorOf(query.sensor), random.Bits());
   STRATA_RETURN_IF_ERROR(mapper.Create());
-  STRATA_RETURN_IF_ERROR(
-      mapper.Scan(Pose(Eigen::Translation3d(start + kSensorHeightM * Vector3d::UnitZ()))));
+  STRATA_RETURN_IF_ERROR(mapper.Scan(Above(start)));
   STRATA_RETURN_IF_ERROR(mapper.DriveAlong({start, ahead}));
   STRATA_ASSIGN_OR_RETURN(const std::string end, ExploreAll(*db, task, ahead, mapper));
   STRATA_ASSIGN_OR_RETURN(const Shares explored, Judge(*db, kExplored, task, ahead));
@@ -346,6 +355,8 @@ int Main(int argc, char** argv) {
   query.count = 1;
   query.budget_m = 300.0;
   query.sensor_height_m = kSensorHeightM;
+  query.min_bits = 300.0;
+  query.bits_per_m = 50.0;
   query.sensor.rows = 64;
   query.sensor.columns = 720;
   app.add_option("--seed", seed, "Of the first draw");
