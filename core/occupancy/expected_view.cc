@@ -89,7 +89,9 @@ ExpectedViews::ExpectedViews(const OccupancyVoxels& grid,
 
 void ExpectedViews::BeginView() {
   if (++view_ < kTaken) return;
-  seen_.ForEach([](std::uint16_t& view) { view = view == kTaken ? kTaken : std::uint16_t{0}; });
+  marks_.ForEach([](Mark& mark) {
+    if (mark.view != kTaken) mark.view = 0;
+  });
   view_ = 1;
 }
 
@@ -103,6 +105,16 @@ double ExpectedViews::WeightAt(const Beams& beams,
   const double cosine = std::hypot(direction.x(), direction.y());
   const double beside = beams.solid_angle * cosine * across * across / voxels_per_length;
   return std::max(1.0, std::min(beams.each, beside));
+}
+
+void ExpectedViews::AddOpenGround(const Vector3d& place) {
+  // Beams end a little above or below it, maybe in another voxel.
+  const Vector3i low = VoxelOf(place / grid_.voxel_m() - 0.25 * Vector3d::UnitZ());
+  const Vector3i high = VoxelOf(place / grid_.voxel_m() + 0.25 * Vector3d::UnitZ());
+  for (Vector3i at = low; at.z() <= high.z(); ++at.z()) {
+    std::uint8_t& open = marks_.FindOrAdd(BlockOf(at))[NodeInBlock(at)].open;
+    open = static_cast<std::uint8_t>(std::min(open + 1, 255));
+  }
 }
 
 // Where the next surface below is, if nobody has seen it yet.
@@ -137,19 +149,23 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
     WalkVoxels(from, from + along, first, [&](const Vector3i& at, double passed) {
       if (!grid_.Inside(at)) return false;
       const double range_m = passed * max_range_m_;
-      std::uint16_t& mark = seen_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
+      Mark& mark = marks_.FindOrAdd(BlockOf(at))[NodeInBlock(at)];
       const std::int16_t odds = reader_.Odds(at);
       const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
-      const bool hit = !unknown && odds > 0 && !Passes(at, from, along, passed);
-      if (mark != kTaken && mark != view_ && counted_.Contains(at)) {
+      const bool open = mark.open > 0 && along.z() < 0.0;
+      const bool hit = unknown ? open : odds > 0 && !Passes(at, from, along, passed);
+      if (mark.view != kTaken && mark.view != view_ && counted_.Contains(at)) {
         const std::size_t number = (unknown ? 0 : odds) - least_odds_;
         const double weight =
             beams.each == 1.0 ? 1.0 : WeightAt(beams, beam, direction.lpNorm<1>(), range_m);
         const double worth = unknown && IsUnderFree(at) ? ground_weight_ : 1.0;
         gain.bits += worth * weight * (hit ? gain_of_hit_ : gain_of_miss_)[number];
+        if (hit && open && !unknown) {
+          gain.bits += ground_weight_ * weight * mark.open * gain_of_hit_[-least_odds_];
+        }
         if (unknown) gain.volume_m3 += weight * std::pow(voxel_m, 3);
       }
-      if (mark != kTaken) mark = view_;
+      if (mark.view != kTaken) mark.view = view_;
       return !hit;
     });
   }
@@ -160,12 +176,12 @@ ViewGain ExpectedViews::Estimate(const Pose& T_map_sensor) { return Look(T_map_s
 
 ViewGain ExpectedViews::Glance(const Pose& T_map_sensor) { return Look(T_map_sensor, few_); }
 
-ViewGain ExpectedViews::Take(const Pose& T_map_sensor) {
-  const ViewGain gain = Look(T_map_sensor, all_);
-  seen_.ForEach([this](std::uint16_t& mark) {
-    if (mark == view_) mark = kTaken;
+ViewGain ExpectedViews::Follow(const Pose& T_map_sensor) { return Look(T_map_sensor, all_); }
+
+void ExpectedViews::Take() {
+  marks_.ForEach([this](Mark& mark) {
+    if (mark.view == view_) mark.view = kTaken;
   });
-  return gain;
 }
 
 }  // namespace strata

@@ -39,16 +39,26 @@ class ExpectedViews {
                 const Eigen::AlignedBox3d& region = OccupancyVoxelsOptions().region,
                 double ground_weight = 1.0);
 
+  // A surface there was seen too sparsely: to a beam that ends in its voxel from above it is one
+  // more voxel of unknown ground.
+  void AddOpenGround(const Eigen::Vector3d& place);
+
   // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
   // would cross.
   ViewGain Estimate(const Pose& T_map_sensor);
   // The same from kMostGlanceBeams: what to estimate first.
   ViewGain Glance(const Pose& T_map_sensor);
-  // From all beams. What they cross is thought to be known from then on and gains nothing any more.
-  ViewGain Take(const Pose& T_map_sensor);
+  // From all beams.
+  ViewGain Follow(const Pose& T_map_sensor);
+  // What the view before crossed is thought to be known from then on and gains nothing any more.
+  void Take();
 
  private:
   static constexpr std::uint16_t kTaken = 0xFFFF;
+  struct Mark {
+    std::uint16_t view = 0;  // that looked last, or kTaken
+    std::uint8_t open = 0;   // places with open ground
+  };
   struct Beams {
     std::vector<Eigen::Vector3d> directions;
     double each = 1.0;         // of the sensor's beams that one stands for
@@ -75,7 +85,7 @@ class ExpectedViews {
   Beams all_, some_, few_;
   std::vector<double> gain_of_hit_, gain_of_miss_;  // by odds
   std::int16_t least_odds_ = 0;
-  VoxelBlocks<std::uint16_t> seen_;  // the view that did last, or kTaken
+  VoxelBlocks<Mark> marks_;
   std::uint16_t view_ = 0;
 };
 

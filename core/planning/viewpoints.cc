@@ -24,6 +24,7 @@
 #include "core/occupancy/expected_view.h"
 #include "core/planning/endpoint.h"
 #include "core/planning/move_cost.h"
+#include "core/planning/open_ground.h"
 #include "core/planning/search.h"
 #include "core/planning/search_workspace.h"
 
@@ -39,11 +40,9 @@ constexpr int kHeadings = 8;
 constexpr double kRegionStepM = 10.0;
 constexpr double kRegionStepUpM = 1.0;
 constexpr double kBelowM = 1.0;
-// What a look costs without any way, so that nothing near is worth endlessly much [m].
-constexpr double kLookCostM = 3.0;
 // What a glance may say too little [1, bits].
 constexpr double kGlanceSlack = 1.5;
-constexpr double kGlanceSlackBits = 50.0;
+constexpr double kGlanceSlackBits = 500.0;
 // So near to each other places see the same [m].
 constexpr double kSameLookM = 0.5;
 constexpr double kAboveM = 1.0;
@@ -153,18 +152,21 @@ class ViewChooser {
               const SeenSpace& seen,
               const AlignedBox3d& region,
               std::vector<Stand> stands,
+              const std::vector<Vector3d>& open_ground,
               const Stop& stop)
       : space_(space),
         query_(query),
         views_(seen.voxels, query.sensor, region, kGroundWeight),
         stands_(std::move(stands)),
+        level_m_(stands_.empty() ? 0.0 : stands_.front().place.z()),
         headings_(query.sensor.width_rad < 2.0 * std::numbers::pi - 1e-3 ? kHeadings : 1),
         looks_(seen.looks),
-        stop_(stop) {}
+        stop_(stop) {
+    for (const Vector3d& place : open_ground) views_.AddOpenGround(place);
+  }
 
   absl::StatusOr<std::vector<ExploreView>> Choose() {
     std::vector<ExploreView> chosen;
-    STRATA_RETURN_IF_ERROR(GlanceAtAll());
     while (chosen.size() < static_cast<std::size_t>(query_.count)) {
       STRATA_ASSIGN_OR_RETURN(const std::size_t best, Best());
       if (best == stands_.size()) break;
@@ -172,15 +174,17 @@ class ViewChooser {
       ExploreView view;
       view.place = stand.place;
       view.T_map_sensor = PoseAt(stand, stand.heading);
-      const ViewGain gain = views_.Take(view.T_map_sensor);
-      for (Stand& other : stands_) other.fresh = false;
+      const ViewGain gain = views_.Follow(view.T_map_sensor);
+      stand.gain_bits = gain.bits;
+      if (UtilityOf(stand) < query_.min_bits) continue;
       view.gain_bits = gain.bits;
       view.volume_m3 = gain.volume_m3;
       view.cost_m = stand.cost_m;
-      view.utility_bits = gain.bits - query_.bits_per_m * stand.cost_m;
-      stand.gain_bits = 0.0;  // but for what it was taken for
-      if (view.utility_bits < query_.min_bits) continue;
+      view.utility_bits = UtilityOf(stand);
       chosen.push_back(view);
+      views_.Take();
+      for (Stand& other : stands_) other.fresh = false;
+      stand.gain_bits = 0.0;
       if (chosen.size() < static_cast<std::size_t>(query_.count)) {
         STRATA_RETURN_IF_ERROR(MoveTo(stand.patch));
       }
@@ -206,8 +210,10 @@ class ViewChooser {
       return headings_ == 1 || turn >= std::cos(0.5 * query_.sensor.width_rad);
     });
   }
-  // What a metre of the way tells.
-  static double RankOf(const Stand& stand) { return stand.gain_bits / (stand.cost_m + kLookCostM); }
+  // Gonzalez-Banos and Latombe, "Navigation Strategies for Exploring Indoor Environments", 2002.
+  static double RankOf(const Stand& stand) {
+    return stand.gain_bits * std::exp(-stand.cost_m / kNearM);
+  }
 
   // Calls look(pose, heading) for the ways to look from the stand that were not tried yet.
   template <typename Look>
@@ -231,16 +237,14 @@ class ViewChooser {
     return absl::OkStatus();
   }
 
-  // Bounds of all, so that few have to be estimated.
-  absl::Status GlanceAtAll() {
-    for (Stand& stand : stands_) {
-      STRATA_RETURN_IF_ERROR(stop_.status());
-      stand.gain_bits = 0.0;
-      ForEachLook(stand, [&](const Pose& T_map_sensor, int /*heading*/) {
-        const double bits = kGlanceSlack * views_.Glance(T_map_sensor).bits + kGlanceSlackBits;
-        stand.gain_bits = std::max(stand.gain_bits, bits);
-      });
-    }
+  // A bound, so that few have to be estimated.
+  absl::Status Glance(Stand& stand) {
+    STRATA_RETURN_IF_ERROR(stop_.status());
+    stand.gain_bits = 0.0;
+    ForEachLook(stand, [&](const Pose& T_map_sensor, int /*heading*/) {
+      const double bits = kGlanceSlack * views_.Glance(T_map_sensor).bits + kGlanceSlackBits;
+      stand.gain_bits = std::max(stand.gain_bits, bits);
+    });
     return absl::OkStatus();
   }
 
@@ -268,11 +272,19 @@ class ViewChooser {
   }
 
   absl::StatusOr<std::size_t> Best() {
+    STRATA_ASSIGN_OR_RETURN(const std::size_t best, BestOfLevel(true));
+    return best != stands_.size() ? best : BestOfLevel(false);
+  }
+
+  // On the robot's own level, or on the others.
+  absl::StatusOr<std::size_t> BestOfLevel(bool own) {
     order_.clear();
     for (std::size_t i = 0; i < stands_.size(); ++i) {
-      if (std::isfinite(stands_[i].cost_m) && UtilityOf(stands_[i]) >= query_.min_bits) {
-        order_.push_back(i);
-      }
+      Stand& stand = stands_[i];
+      if ((std::abs(stand.place.z() - level_m_) <= kLevelM) != own) continue;
+      if (!std::isfinite(stand.cost_m)) continue;
+      if (!std::isfinite(stand.gain_bits)) STRATA_RETURN_IF_ERROR(Glance(stand));
+      if (UtilityOf(stand) >= query_.min_bits) order_.push_back(i);
     }
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
       return stands_[a].cost_m < stands_[b].cost_m;
@@ -289,6 +301,7 @@ class ViewChooser {
 
   // What the others cost from there.
   absl::Status MoveTo(PatchId patch) {
+    level_m_ = space_.Height(patch);
     SearchWorkspace workspace;
     STRATA_RETURN_IF_ERROR(
         ReachAll(space_, patch, workspace, stop_, CostOf(space_, 2.0 * query_.budget_m)).status());
@@ -309,6 +322,7 @@ class ViewChooser {
   const ExploreQuery& query_;
   ExpectedViews views_;
   std::vector<Stand> stands_;
+  double level_m_;  // where the robot is then
   std::vector<std::size_t> order_;
   const int headings_;
   const std::vector<Pose>& looks_;
@@ -353,7 +367,8 @@ absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
   SearchWorkspace workspace;
   const std::uint32_t budget = CostOf(space, query.budget_m);
   STRATA_RETURN_IF_ERROR(ReachAll(space, from.patch, workspace, stop, budget).status());
-  std::vector<Stand> stands = ThinnedOut(ReachedPlaces(space, workspace, budget));
+  const std::vector<Stand> places = ReachedPlaces(space, workspace, budget);
+  std::vector<Stand> stands = ThinnedOut(places);
   STRATA_RETURN_IF_ERROR(space.status());
   result.stands = stands.size();
   result.region = query.region.value_or(RegionAround(stands, query));
@@ -381,7 +396,11 @@ absl::StatusOr<ExploreResult> ChooseViews(SearchSpace& space,
   STRATA_RETURN_IF_ERROR(CheckVoxels(around, query.resolution_m));
   STRATA_ASSIGN_OR_RETURN(const std::shared_ptr<const SeenSpace> seen,
                           space_of(around, query.resolution_m));
-  ViewChooser chooser(space, query, *seen, result.region, std::move(stands), stop);
+  std::vector<PatchId> reached;
+  reached.reserve(places.size());
+  for (const Stand& place : places) reached.push_back(place.patch);
+  const std::vector<Vector3d> open = OpenGround(space, reached, *seen, query.sensor);
+  ViewChooser chooser(space, query, *seen, result.region, std::move(stands), open, stop);
   STRATA_ASSIGN_OR_RETURN(result.views, chooser.Choose());
   STRATA_RETURN_IF_ERROR(space.status());
   result.reason = result.views.empty() ? ExploreReason::kExplored : ExploreReason::kViews;

@@ -31,16 +31,23 @@ using SpaceOf = absl::FunctionRef<absl::StatusOr<std::shared_ptr<const SeenSpace
 
 // Between stands that are compared [m].
 inline constexpr double kStandSpacingM = 1.5;
+// What is so much farther has to tell e times as much [m].
+inline constexpr double kNearM = 10.0;
+// Heights of one level [m].
+inline constexpr double kLevelM = 0.5;
 // How often ground that nobody has seen counts, for robots drive on it (ExpectedViews).
 inline constexpr double kGroundWeight = 10.0;
 
 // Stands are places to stand within the budget, no two closer than kStandSpacingM, the cheapest
 // first; a sensor that does not look all around is turned in eighths. Of the `horizon` nearest
-// whose utility EI - λ · cost (eq. 4.15) is worth min_bits the one is taken of which a metre of the
-// way tells most, else of the next ones: the greatest utility itself sends a robot to and fro.
-// Nothing is expected of where a scan was taken already. Then the robot is thought to be there, and
-// what it would see to be known. Fills all but epoch and elapsed_ms. The same for the same tiles,
-// scans and query.
+// whose utility EI - λ · cost (eq. 4.15) is worth min_bits the one is taken that tells most, less
+// by a factor e every kNearM of the way (Gonzalez-Banos and Latombe, 2002), else of the next ones:
+// the greatest utility itself sends a robot to and fro. Stands within kLevelM of the robot's height
+// come first: to leave a level and to come back for what is left there costs the way between levels
+// twice. Ground that goes on from where the robot can be, but was seen too sparsely to drive on, is
+// unknown whatever its voxels say (open_ground.h). Nothing is expected of where a scan was taken
+// already. Then the robot is thought to be there, and what it would see to be known. Fills all but
+// epoch and elapsed_ms. The same for the same tiles, scans and query.
 //   INVALID_ARGUMENT   the query; a start beyond the map's range; a region of more voxels than
 //                      kMaxExploreVoxels, with a resolution that fits
 //   errors of `space`, `space_of` and `stop`

@@ -253,7 +253,8 @@ double UtilityOf(const OccupancyVoxels& grid, const SubPath& path, const Options
   ExpectedViews views(grid, laser, GridBox());
   double bits = 0.0;
   for (std::size_t i = 0; i < path.poses.size(); i += kLookEvery) {
-    bits += views.Take(path.poses[i]).bits;
+    bits += views.Follow(path.poses[i]).bits;
+    views.Take();
   }
   return bits - options.lambda_bits / path.clear_m;
 }

@@ -109,7 +109,7 @@ TEST(ExpectedViewTest, AgreesWithBeamsFollowedStepByStep) {
     const OccupancyVoxels grid = SeenHall(model);
     for (const Pose& pose : {At(2.03, 4.07), At(5.01, 1.53, 0.3), At(8.07, 4.33, 2.0)}) {
       const ViewGain expected = StepByStep(grid, Sensor(), pose);
-      const ViewGain taken = ExpectedViews(grid, Sensor()).Take(pose);
+      const ViewGain taken = ExpectedViews(grid, Sensor()).Follow(pose);
       EXPECT_NEAR(taken.bits, expected.bits, 0.01 * expected.bits + 0.5);
       EXPECT_NEAR(taken.volume_m3, expected.volume_m3, 0.01 * expected.volume_m3 + 0.05);
       const ViewGain some = ExpectedViews(grid, Sensor()).Estimate(pose);
@@ -131,11 +131,35 @@ TEST(ExpectedViewTest, WhatIsBehindTheWallIsWorthMore) {
 TEST(ExpectedViewTest, WhatIsTakenGainsNothingAgain) {
   const OccupancyVoxels grid = SeenHall(InverseSensorModel::OfOneLook());
   ExpectedViews views(grid, Sensor());
-  const double first = views.Take(At(7.0, 4.0)).bits;
+  const double first = views.Follow(At(7.0, 4.0)).bits;
+  EXPECT_EQ(views.Follow(At(7.0, 4.0)).bits, first);
+  views.Take();
   EXPECT_GT(first, 100.0);
-  EXPECT_EQ(views.Take(At(7.0, 4.0)).bits, 0.0);
+  EXPECT_EQ(views.Follow(At(7.0, 4.0)).bits, 0.0);
   EXPECT_EQ(views.Estimate(At(7.0, 4.0)).bits, 0.0);
   EXPECT_GT(views.Estimate(At(10.0, 7.0)).bits, 0.0);
+}
+
+// From above, by a beam that ends there before another passed.
+TEST(ExpectedViewTest, OpenGroundIsWorthAVoxelOfGroundUntilItIsTaken) {
+  const OccupancyVoxels grid = SeenHall(InverseSensorModel::OfOneLook());
+  const auto views = [&grid] {
+    return ExpectedViews(grid, Sensor(), OccupancyVoxelsOptions().region, 10.0);
+  };
+  const Pose pose = At(2.03, 4.07);
+  const double before = views().Follow(pose).bits;
+  ExpectedViews with = views();
+  for (const double x : {4.95, 5.15, 5.35}) with.AddOpenGround({x, 4.07, -0.1});
+  with.AddOpenGround({7.1, 0.5, -0.1});  // behind the wall
+  const double more = with.Follow(pose).bits - before;
+  const double each = 10.0 * InformationGainBits(0.5, InverseSensorModel::OfOneLook().most);
+  EXPECT_GT(more, 0.99 * each);
+  EXPECT_LT(more, 3.01 * each);
+  with.Take();
+  EXPECT_EQ(with.Follow(pose).bits, 0.0);
+  ExpectedViews from_below = views();
+  from_below.AddOpenGround({5.1, 4.07, 3.1});
+  EXPECT_EQ(from_below.Follow(pose).bits, before);
 }
 
 // More views than the 16 bits that tell one from the next.

@@ -133,9 +133,9 @@ TEST(ViewpointsTest, LooksWhereNobodyHasLooked) {
   }
 }
 
-// Its first view tells the most a metre of all that the answer could be of, up to how gains are
-// estimated; what tells most at all is left for later.
-TEST(ViewpointsTest, NoOtherStandTellsMuchMoreAMetre) {
+// Its first view tells the most of all that the answer could be of, for how far it is and up to how
+// gains are estimated; what tells most at all is left for later.
+TEST(ViewpointsTest, NoOtherStandTellsMuchMoreForItsWay) {
   World world;
   const Vector3d start(4.0, 4.0, 1.0);
   world.See(start);
@@ -144,22 +144,24 @@ TEST(ViewpointsTest, NoOtherStandTellsMuchMoreAMetre) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult result, world.Explore(query));
   ASSERT_THAT(result.views, SizeIs(1));
   STRATA_ASSERT_OK_AND_ASSIGN(const auto seen, world.SpaceOf(result.region, query.resolution_m));
-  const auto a_metre = [](double bits, double way_m) { return bits / (way_m + 3.0); };
-  double most = 0.0, most_a_metre = 0.0;
+  const auto for_the_way = [](double bits, double way_m) {
+    return bits * std::exp(-way_m / kNearM);
+  };
+  double most = 0.0, most_for_the_way = 0.0;
   for (double x = 0.5; x < 24.0; x += 1.0) {
     for (double y = 0.5; y < 8.0; y += 1.0) {
       const Vector3d at(x, y, 1.0);
       const double way_m = (at - start).norm();
       if (way_m < 0.8) continue;
       const double gain = ExpectedViews(seen->voxels, query.sensor, result.region, kGroundWeight)
-                              .Take(Pose(Eigen::Translation3d(at)))
+                              .Follow(Pose(Eigen::Translation3d(at)))
                               .bits;
       most = std::max(most, gain);
-      most_a_metre = std::max(most_a_metre, a_metre(gain, 1.1 * way_m));
+      most_for_the_way = std::max(most_for_the_way, for_the_way(gain, 1.1 * way_m));
     }
   }
   const ExploreView& view = result.views[0];
-  EXPECT_GT(a_metre(view.gain_bits, view.cost_m), 0.9 * most_a_metre);
+  EXPECT_GT(for_the_way(view.gain_bits, view.cost_m), 0.9 * most_for_the_way);
   EXPECT_LT(view.gain_bits, 0.9 * most);
 }
 
@@ -243,8 +245,8 @@ TEST(ViewpointsTest, ANarrowSensorIsTurnedToWhatIsUnknown) {
   STRATA_ASSERT_OK_AND_ASSIGN(const auto seen, world.SpaceOf(result.region, query.resolution_m));
   const Pose chosen = result.views[0].T_map_sensor;
   const Pose back = chosen * Pose(Eigen::AngleAxisd(M_PI, Vector3d::UnitZ()));
-  EXPECT_GE(ExpectedViews(seen->voxels, query.sensor).Take(chosen).bits,
-            ExpectedViews(seen->voxels, query.sensor).Take(back).bits);
+  EXPECT_GE(ExpectedViews(seen->voxels, query.sensor).Follow(chosen).bits,
+            ExpectedViews(seen->voxels, query.sensor).Follow(back).bits);
 }
 
 TEST(ViewpointsTest, TheSameAgain) {
