@@ -129,6 +129,11 @@ Finding CheckDatabase(const std::string& store) {
     absl::StrAppend(&message, before, server, " ", maps);
     before = ", ";
   }
+  before = "; servers: ";
+  for (const auto& [server, roles] : check->servers) {
+    absl::StrAppend(&message, before, server, " (", roles, ")");
+    before = ", ";
+  }
   if (check->faults.empty()) return Ok("store", message);
   return Warning("store",
                  absl::StrCat(message,

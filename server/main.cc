@@ -93,6 +93,7 @@ LogLine StartLine(const ProgramOptions& options, const std::string& address) {
   line.Add("version", STRATA_VERSION)
       .Add("data", options.engine.directory.string())
       .Add("store", options.engine.store.empty() ? "files" : "postgresql")
+      .Add("role", RolesOf(options.engine))
       .Add("listen", address)
       .Add("tls", server.tls.enabled() ? (server.tls.client_ca.empty() ? "yes" : "mutual") : "no")
       .Add("tokens", server.token_file.empty() ? "no" : "yes")

@@ -3,8 +3,11 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <system_error>
+#include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include <unistd.h>
@@ -42,6 +45,7 @@ struct Written {
   std::uint64_t queue_mib = 64;
   std::uint64_t cache_mib = 160;
   std::uint64_t max_map_mib = 0;
+  std::vector<std::string> roles = {"gateway", "integrator", "worker"};
   EngineOptions engine;
   ServerOptions server;
 };
@@ -292,6 +296,16 @@ void AddMapLimits(CLI::App& app, Written& o) {
 void AddSharing(CLI::App& app, Written& o) {
   constexpr char kGroup[] = "Several servers on one --store";
   app.add_option(
+         "--role",
+         o.roles,
+         "What this server does: each answers calls (gateway); an integrator takes maps, joins "
+         "scans into them and runs jobs that change tiles or poses; a worker runs the other "
+         "jobs, of any map")
+      ->type_name("gateway,integrator,worker")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"gateway", "integrator", "worker"}).description(""))
+      ->group(kGroup);
+  app.add_option(
          "--server-name",
          o.engine.server_name,
          "What other servers call this one; where it is HOST:PORT, clients that know one of "
@@ -331,6 +345,13 @@ absl::StatusOr<ProgramOptions> Read(const Written& o) {
   options.engine.upload_keep = absl::Seconds(o.upload_keep_s);
   options.engine.map_idle = absl::Seconds(o.map_idle_s);
   options.engine.map_lease = absl::Seconds(o.map_lease_s);
+  options.engine.integrates = absl::c_linear_search(o.roles, "integrator");
+  options.engine.works = absl::c_linear_search(o.roles, "worker");
+  const bool all = options.engine.integrates && options.engine.works;
+  if (!all && options.engine.store.empty()) {
+    return absl::InvalidArgumentError(
+        "--role leaves something out, but nobody else can have the maps of --data; name --store");
+  }
   if (options.engine.server_name.empty()) {
     options.engine.server_name = DefaultServerName(o.server.listen);
   }

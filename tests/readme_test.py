@@ -61,7 +61,7 @@ def page_with_database_holds(page, environment):
         if database.address is None:
             print(f"{page}: left out, PostgreSQL 15 is not installed")
             return True
-        return holds([page], {**environment, "STRATA_DATABASE": database.address, "ONE": free_address(), "TWO": free_address()})
+        return holds([page], {**environment, "STRATA_DATABASE": database.address, "ONE": free_address(), "TWO": free_address(), "THREE": free_address()})
 
 
 def free_address():

@@ -14,6 +14,7 @@
 #include "core/geometry/pose.h"
 #include "core/mls/tile_key.h"
 #include "core/world/constraint.h"
+#include "core/world/job.h"
 #include "core/world/map_info.h"
 #include "core/world/scan.h"
 
@@ -51,6 +52,27 @@ struct WaitingMap {
   bool scans = false;  // for integration
   bool jobs = false;
   std::uint64_t edits = 0;  // the number of the last one; 0: none
+  bool deletion = false;    // of the map (EditKind::kDeleteMap)
+};
+
+// A server that lives, on the same store.
+struct LiveServer {
+  std::string holder;  // which it is, however often it is started
+  bool works = false;  // it runs jobs of maps that others have
+};
+
+// A parameter that no kind has, set on a job as it is stored while a server runs it that has not
+// got the map: "HOLDER/TOKEN", by which the server's commits are told from those of one that has
+// lost it.
+inline constexpr char kRunBy[] = "run_by";
+
+// A job of some map that waits or runs.
+struct UnfinishedJob {
+  std::string map;
+  std::uint64_t id = 0;
+  std::string kind;
+  JobState state = JobState::kQueued;
+  std::string run_by;  // kRunBy; empty: not set
 };
 
 // A scan without its points.
@@ -88,6 +110,7 @@ enum class EditKind : std::uint8_t {  // stored
   kSetLabels = 3,
   kUpdateLabels = 4,  // those that are 0 leave what people said
   kSetDefaultProfile = 5,
+  kDeleteMap = 6,  // which is no work of its worker's: WaitingMap::deletion
 };
 
 // An edit that is asked for where another process has the map.

@@ -104,12 +104,13 @@ class StorageReader {
   virtual absl::StatusOr<std::vector<Attempt>> ListAttempts() = 0;
 
   // Edits that were asked for elsewhere (StorageWriter::PutEdit()): the first that waits with a
-  // number in (after, until]. A store that no other process writes has none.
+  // number in (after, until], but for EditKind::kDeleteMap. A store that no other process writes
+  // has none.
   virtual absl::StatusOr<std::optional<EditRequest>> FindEdit(std::uint64_t /*after*/,
                                                               std::uint64_t /*until*/) {
     return std::nullopt;
   }
-  // The number of the last that waits; 0: none.
+  // The number of the last such that waits; 0: none.
   virtual absl::StatusOr<std::uint64_t> LastEdit() { return 0; }
   // What became of one; nullopt: it waits. NOT_FOUND once it was withdrawn or forgotten.
   virtual absl::StatusOr<std::optional<absl::Status>> FindAnswer(std::uint64_t edit) {

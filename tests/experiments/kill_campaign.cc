@@ -86,6 +86,8 @@ int Main(int argc, char** argv) {
   CLI::App* cluster = app.add_subcommand(
       "cluster", "Servers of one database are killed and frozen, and the database crashes");
   cluster->add_option("--servers", several_servers, "")->capture_default_str();
+  cluster->add_option("--role", world.roles, "Of one server after the other, again for each")
+      ->delimiter(';');
   cluster->add_option("--faults", several.faults, "")->capture_default_str();
   cluster->add_option("--robot-kills", several.robot_kills, "")->capture_default_str();
   cluster->add_flag(

@@ -62,6 +62,7 @@ absl::StatusOr<JobInfo> EngineJobs::Start(const api::Call& call,
                                           const std::map<std::string, std::string>& parameters) {
   STRATA_RETURN_IF_ERROR(call.stop.status());
   STRATA_ASSIGN_OR_RETURN(const EngineMaps::Place place, maps_.FindToAdd(call.stop, map));
+  STRATA_RETURN_IF_ERROR(maps_.CheckWorked(kind));
   if (place.map == nullptr) return StartJobBeside(*place.store, kind, parameters);
   Map& found = *place.map;
   STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(kind, parameters));

@@ -76,6 +76,12 @@ absl::Status Map::TakeInJobs(std::optional<std::uint64_t> id) {
   return absl::OkStatus();
 }
 
+absl::Status Map::ReturnDeadJobs(const std::set<std::string>& alive) {
+  STRATA_RETURN_IF_ERROR(jobs_->ReturnDead(alive));
+  if (jobs_->NextId().has_value()) runner_->JobQueued();
+  return absl::OkStatus();
+}
+
 bool Map::HasJobs() const {
   return jobs_->AnyIn(JobState::kQueued) || jobs_->AnyIn(JobState::kRunning);
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -69,6 +70,9 @@ class Map {
   void JobQueued() { runner_->JobQueued(); }
   // Jobs, or this one, may have been queued or decided elsewhere.
   absl::Status TakeInJobs(std::optional<std::uint64_t> id = std::nullopt);
+
+  // As JobBoard::ReturnDead().
+  absl::Status ReturnDeadJobs(const std::set<std::string>& alive);
 
   // Jobs wait or run.
   bool HasJobs() const;

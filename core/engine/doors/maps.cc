@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -21,6 +22,7 @@
 #include "core/common/status.h"
 #include "core/engine/doors/backup.h"
 #include "core/engine/ingest/edits.h"
+#include "core/engine/jobs/job_handlers.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/tiles/map_stats.h"
 #include "core/world/names.h"
@@ -91,8 +93,29 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
   auto directory = std::make_unique<const MapDirectory>(std::move(owned));
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<const MapStores> stores, open(options, *directory));
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<OpenMaps> maps, OpenMaps::Start(options, *stores));
-  return std::unique_ptr<EngineMaps>(
+  std::unique_ptr<EngineMaps> engine(
       new EngineMaps(options, std::move(directory), std::move(stores), std::move(maps)));
+  if (options.works && engine->IsShared()) {
+    STRATA_ASSIGN_OR_RETURN(std::string holder, engine->directory_->Identity());
+    OpenMaps& all = *engine->maps_;
+    engine->jobs_elsewhere_ = std::make_unique<JobsElsewhere>(
+        options,
+        *engine->stores_,
+        all.caches(),
+        std::move(holder),
+        [&all](const std::string& name) { return all.IsOpen(name); });
+  }
+  return engine;
+}
+
+absl::Status EngineMaps::CheckWorked(absl::string_view kind) const {
+  if (options_.works || !RunsAnywhere(kind)) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(const std::vector<LiveServer> servers, stores_->ListServers());
+  if (absl::c_any_of(servers, [](const LiveServer& server) { return server.works; })) {
+    return absl::OkStatus();
+  }
+  return absl::UnavailableError(absl::StrCat(
+      "no server on this store runs jobs of kind ", kind, ": start one with --role worker"));
 }
 
 absl::StatusOr<std::shared_ptr<Map>> EngineMaps::Find(const Stop& stop, absl::string_view name) {
@@ -170,11 +193,19 @@ absl::Status EngineMaps::Edit(const Stop& stop,
         "an edit",
         behind);
   }
-  // Where nobody has the map any more this engine takes it, and finds the edit.
-  return AskForEdit(*place.store, edit, stop, [&]() -> absl::Status {
-    absl::Status here = maps_->Find(stop, name).status();
-    return absl::IsUnavailable(here) ? absl::OkStatus() : here;
-  });
+  return AskForEdit(*place.store, edit, stop, [&] { return CheckTaken(stop, name); });
+}
+
+absl::Status EngineMaps::CheckTaken(const Stop& stop, absl::string_view name) {
+  absl::Status here = maps_->Find(stop, name).status();
+  if (absl::IsAborted(here)) return absl::OkStatus();  // it is being deleted here, as was asked
+  return absl::IsUnavailable(here) ? stores_->CheckTaken(name) : here;
+}
+
+absl::Status EngineMaps::Refusal(absl::string_view name, const absl::Status& refused) const {
+  if (!MapOwnerOf(refused).has_value()) return refused;
+  STRATA_RETURN_IF_ERROR(stores_->CheckTaken(name));
+  return refused;
 }
 
 absl::StatusOr<MapReading> EngineMaps::FindTilesToRead(const api::Call& call,
@@ -225,14 +256,40 @@ absl::StatusOr<std::vector<MapInfo>> EngineMaps::List(const api::Call& call) {
   return maps_->List(call.stop);
 }
 
-absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
-  STRATA_RETURN_IF_ERROR(call.stop.status());
-  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
-  STRATA_RETURN_IF_ERROR(maps_->Remove(call.stop, name, [&](std::uint64_t clock) -> absl::Status {
+absl::Status EngineMaps::DeleteHere(const Stop& stop, absl::string_view name) {
+  return maps_->Remove(stop, name, [&](std::uint64_t clock) -> absl::Status {
     absl::MutexLock lock(&removing_);
     STRATA_RETURN_IF_ERROR(stores_->CheckRemovable(name));
     return stores_->Delete(name, clock);
-  }));
+  });
+}
+
+// Its owner lets go of it first: once this returns nobody is served it any more, wherever he asks.
+absl::Status EngineMaps::DeleteElsewhere(const Stop& stop,
+                                         absl::string_view name,
+                                         const absl::Status& refused) {
+  const absl::StatusOr<std::unique_ptr<MapStorage>> store =
+      stores_->OpenToAdd(name, options_.max_pending_scans);
+  if (absl::IsUnavailable(store.status())) return refused;  // he has left
+  STRATA_RETURN_IF_ERROR(store.status());
+  const absl::Status asked =
+      AskForEdit(**store, DeletingMap(), stop, [&] { return CheckTaken(stop, name); });
+  if (!absl::IsNotFound(asked)) return asked;
+  maps_->ForgetIfGone(std::string(name));
+  return stores_->FinishDeletions();
+}
+
+absl::Status EngineMaps::Delete(const api::Call& call, absl::string_view name) {
+  STRATA_RETURN_IF_ERROR(call.stop.status());
+  STRATA_RETURN_IF_ERROR(ValidateName("map name", name));
+  // Another engine may have made it, or have it.
+  absl::Status deleted = IsShared() ? maps_->Find(call.stop, name).status() : absl::OkStatus();
+  if (MapOwnerOf(deleted).has_value()) {
+    deleted = DeleteElsewhere(call.stop, name, deleted);
+  } else if (!absl::IsNotFound(deleted)) {
+    deleted = DeleteHere(call.stop, name);
+  }
+  STRATA_RETURN_IF_ERROR(deleted);
   absl::MutexLock lock(&mutex_);
   backed_up_.erase(std::string(name));
   return absl::OkStatus();

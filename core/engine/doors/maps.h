@@ -27,6 +27,7 @@
 #include "core/engine/doors/map_watch.h"
 #include "core/engine/doors/open_maps.h"
 #include "core/engine/doors/store_clocks.h"
+#include "core/engine/jobs/jobs_elsewhere.h"
 #include "core/engine/map/directory.h"
 #include "core/engine/map/engine_options.h"
 #include "core/engine/map/map_stores.h"
@@ -52,6 +53,11 @@ class EngineMaps final : public api::Maps {
   // map.
   absl::StatusOr<MapReading> FindToRead(const api::Call& call, absl::string_view name);
 
+  // That jobs of the kind are run: by whom has the map, or by any that works. UNAVAILABLE.
+  absl::Status CheckWorked(absl::string_view kind) const;
+  // Of a call that was refused because another engine has the map: `refused`, or that none takes
+  // it.
+  absl::Status Refusal(absl::string_view name, const absl::Status& refused) const;
   // Returns once the map may not be at that commit and epoch any more.
   absl::Status AwaitNews(const MapReading& map,
                          std::uint64_t commit_sequence,
@@ -123,6 +129,15 @@ class EngineMaps final : public api::Maps {
 
   class CopyTurn;
 
+  absl::Status DeleteHere(const Stop& stop, absl::string_view name);
+  // Of a map that another engine has, as `refused` says.
+  absl::Status DeleteElsewhere(const Stop& stop,
+                               absl::string_view name,
+                               const absl::Status& refused);
+  // For an edit that waits for another engine: where nobody has the map any more this one takes it,
+  // and finds the edit. UNAVAILABLE where none takes any.
+  absl::Status CheckTaken(const Stop& stop, absl::string_view name);
+
   // Of a map that another engine has: whether it stands where the watcher was told, or did `lag`
   // ago at most.
   absl::StatusOr<bool> IsAt(absl::string_view name,
@@ -137,6 +152,7 @@ class EngineMaps final : public api::Maps {
   const std::unique_ptr<const MapDirectory> directory_;
   const std::unique_ptr<const MapStores> stores_;
   const std::unique_ptr<OpenMaps> maps_;
+  std::unique_ptr<JobsElsewhere> jobs_elsewhere_;  // of shared stores, where it works
   StoreClocks clocks_{*stores_};
   absl::Mutex removing_;  // one map's file is removed at a time
   mutable absl::Mutex mutex_;

@@ -303,6 +303,7 @@ void OpenMaps::CloseNow(const std::string& name, std::shared_ptr<Map> map) {
 absl::Status OpenMaps::Make(const Stop& stop,
                             const std::string& name,
                             absl::FunctionRef<absl::Status()> make) {
+  if (stores_.IsShared()) ForgetIfGone(name);
   {
     absl::MutexLock lock(&mutex_);
     if (entries_.contains(name)) {
@@ -416,6 +417,11 @@ absl::StatusOr<std::vector<MapInfo>> OpenMaps::List(const Stop& stop) {
     }
   }
   return infos;
+}
+
+bool OpenMaps::IsOpen(const std::string& name) const {
+  absl::MutexLock lock(&mutex_);
+  return open_.contains(name);
 }
 
 std::vector<std::shared_ptr<Map>> OpenMaps::Open() const {

@@ -60,11 +60,16 @@ class OpenMaps {
                       absl::string_view name,
                       absl::FunctionRef<absl::Status(std::uint64_t clock)> remove);
 
+  // Of shared stores: forgets a map that is not open here and that another engine has removed.
+  void ForgetIfGone(const std::string& name);
+
   // By name, without opening any; those that do not open are left out. Waits until each was looked
   // at once, which `stop` ends; of shared stores some seconds ago at most, or as long as that takes
   // ten times.
   absl::StatusOr<std::vector<MapInfo>> List(const Stop& stop);
   const std::shared_ptr<CacheBudget>& caches() const { return caches_; }
+  // Whether it is open, or about to be.
+  bool IsOpen(const std::string& name) const;
   // Those that are open now.
   std::vector<std::shared_ptr<Map>> Open() const;
   // Of open maps, then as last known of others.
@@ -140,6 +145,10 @@ class OpenMaps {
   void TakeAbandoned();
   // Has maps look for scans, jobs and edits that came in at other engines; whether edits did.
   bool TellOfArrivals();
+  // Of jobs that engines ran that are gone.
+  void ReturnDeadJobs(Map& map);
+  // Deletes the map as another engine has asked.
+  void RemoveAsAsked(const std::string& name);
   void Note(const std::string& name, absl::StatusOr<MapOutline> outline);
   void TakeInOrigin(const std::string& name, const MapOutline& outline);
   // Whether there was room.

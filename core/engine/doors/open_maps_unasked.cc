@@ -31,6 +31,8 @@ constexpr absl::Duration kLongSurvey = absl::Milliseconds(500);  // is worth a l
 // Whoever edits a map by another engine edits more: for so long it is looked for so often.
 constexpr absl::Duration kEditing = absl::Seconds(10);
 constexpr absl::Duration kLookWhileEditing = absl::Milliseconds(100);
+// So long it takes at most to forget a map that has just been deleted.
+constexpr absl::Duration kSettled = absl::Seconds(1);
 
 }  // namespace
 
@@ -43,8 +45,8 @@ void OpenMaps::Loop() {
       if (!surveyed) surveyed = SurveyAgain(absl::ZeroDuration()).ok();
       if (surveyed && stores_.IsShared()) {
         SurveyAgain(kSurveyInterval).IgnoreError();  // the next one may succeed
-        TakeAbandoned();
-        if (TellOfArrivals()) edited = SteadyNow();
+        if (options_.integrates) TakeAbandoned();
+        if (options_.integrates && TellOfArrivals()) edited = SteadyNow();
       }
       OpenAllWanted();
       CloseIdle();
@@ -109,16 +111,27 @@ void OpenMaps::ForgetClosedBut(const std::set<std::string>& names) {
       if (entry.state == State::kClosed && !names.contains(name)) unseen.push_back(name);
     }
   }
-  for (const std::string& name : unseen) {
-    const absl::StatusOr<bool> there = stores_.Has(name);
-    if (!there.ok() || *there) continue;
+  for (const std::string& name : unseen) ForgetIfGone(name);
+}
+
+void OpenMaps::ForgetIfGone(const std::string& name) {
+  {
+    // As another engine has asked, a moment ago.
+    const auto settled = [&]() ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+      const auto it = entries_.find(name);
+      return it == entries_.end() || it->second.state != State::kGoing;
+    };
     absl::MutexLock lock(&mutex_);
-    const auto it = entries_.find(name);
-    if (it == entries_.end() || it->second.state != State::kClosed) continue;
-    wanted_.erase(name);
-    failed_.erase(name);
-    entries_.erase(it);
+    mutex_.AwaitWithTimeout(absl::Condition(&settled), kSettled);
   }
+  const absl::StatusOr<bool> there = stores_.Has(name);
+  if (!there.ok() || *there) return;
+  absl::MutexLock lock(&mutex_);
+  const auto it = entries_.find(name);
+  if (it == entries_.end() || it->second.state != State::kClosed) return;
+  wanted_.erase(name);
+  failed_.erase(name);
+  entries_.erase(it);
 }
 
 void OpenMaps::TakeAbandoned() {
@@ -143,6 +156,10 @@ bool OpenMaps::TellOfArrivals() {
   bool edits = false;
   std::map<std::string, WaitingMap> arrived;
   for (const WaitingMap& one : *waiting) {
+    if (one.deletion) {
+      RemoveAsAsked(one.name);
+      continue;
+    }
     arrived[one.name] = one;
     edits = edits || one.edits > 0;
   }
@@ -153,8 +170,27 @@ bool OpenMaps::TellOfArrivals() {
     // What waits or runs here may have been cancelled elsewhere. An error: it is looked again.
     const bool jobs = it != arrived.end() && it->second.jobs;
     if (jobs || map->HasJobs()) map->TakeInJobs().IgnoreError();
+    if (map->jobs().AnyElsewhere()) ReturnDeadJobs(*map);
   }
   return edits;
+}
+
+void OpenMaps::ReturnDeadJobs(Map& map) {
+  const absl::StatusOr<std::vector<LiveServer>> servers = stores_.ListServers();
+  if (!servers.ok()) return;
+  std::set<std::string> alive;
+  for (const LiveServer& server : *servers) {
+    if (server.works) alive.insert(server.holder);
+  }
+  map.ReturnDeadJobs(alive).IgnoreError();  // the next look may succeed
+}
+
+void OpenMaps::RemoveAsAsked(const std::string& name) {
+  const absl::Status removed =
+      Remove(closing_, name, [&](std::uint64_t) { return stores_.DeleteAsAsked(name); });
+  // Until it is withdrawn, it is tried again at the next look, by whoever has the map then.
+  LOG_IF(INFO, removed.ok())
+      << LogLine("map").Add("map", name).Add("deleted", "as asked elsewhere");
 }
 
 // The origin of a map that is open here may be set elsewhere.
@@ -189,7 +225,7 @@ void OpenMaps::Note(const std::string& name, absl::StatusOr<MapOutline> outline)
       entry.info->name = name;
       entry.clock = outline->clock;
       entry.numbers = std::move(outline->numbers);
-      if (!outline->has_work) return;
+      if (!outline->has_work || !options_.integrates) return;
     }
     wanted_.insert(name);
   }

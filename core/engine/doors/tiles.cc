@@ -252,10 +252,11 @@ absl::StatusOr<std::vector<api::TileInfo>> EngineTiles::List(const api::Call& ca
   if (found.map() != nullptr) {
     STRATA_RETURN_IF_ERROR(VisitTiles(*found.map(), area, call.stop, take).status());
   } else {
-    STRATA_RETURN_IF_ERROR(VisitStored(
+    const absl::Status visited = VisitStored(
         found, area, call.stop, [&](StorageReader&, const SurfaceTileRow& row, const MapClock&) {
           return take(row, MapView());
-        }));
+        });
+    STRATA_RETURN_IF_ERROR(maps_.Refusal(map, visited));
   }
   std::sort(infos.begin(), infos.end(), [](const api::TileInfo& a, const api::TileInfo& b) {
     return a.key < b.key;
@@ -275,9 +276,9 @@ absl::Status EngineTiles::Fetch(const api::Call& call,
     if (Contains(area, tile.key)) versions[tile.key] = tile.version;
   }
   if (found.map() == nullptr) {
-    STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
-                            FetchStored(found, area, call.stop, versions, sink));
-    return SendGone(versions, epoch, call.stop, sink);
+    const absl::StatusOr<std::uint64_t> epoch = FetchStored(found, area, call.stop, versions, sink);
+    STRATA_RETURN_IF_ERROR(maps_.Refusal(map, epoch.status()));
+    return SendGone(versions, *epoch, call.stop, sink);
   }
   const auto send = [&](const SurfaceTileRow& row, const MapView& view) -> absl::Status {
     const std::optional<Kind> kind = TakeKind(row, versions);

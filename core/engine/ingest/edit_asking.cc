@@ -44,7 +44,7 @@ class AskedEdit {
       return OutcomeUnknown(answer.status().message());
     }
     last_read_ = SteadyNow();
-    return absl::IsNotFound(answer.status()) ? NotInTime() : answer;
+    return absl::IsNotFound(answer.status()) ? WhyGone() : answer;
   }
 
   // `why`, or the answer where there is one.
@@ -55,7 +55,9 @@ class AskedEdit {
       STRATA_ASSIGN_OR_RETURN(waited, writer.WithdrawEdit(number_));
       return absl::OkStatus();
     });
-    if (!withdrawn.ok() || waited) return why;
+    if (waited) return why;
+    if (IsMapGone(withdrawn)) return MapGone();
+    if (!withdrawn.ok()) return why;
     const absl::StatusOr<std::optional<absl::Status>> answer = Read();
     return answer.ok() && answer->has_value() ? **answer : why;
   }
@@ -68,6 +70,14 @@ class AskedEdit {
   }
 
  private:
+  // What the edit was of is there no more.
+  static bool IsMapGone(const absl::Status& status) {
+    return MustBeOpenedAnew(status) && !IsOutcomeUnknown(status);
+  }
+  static absl::Status MapGone() {
+    return absl::NotFoundError("the map was deleted, and the edit with it");
+  }
+  absl::Status WhyGone() { return IsMapGone(store_.CheckInPlace()) ? MapGone() : NotInTime(); }
   absl::StatusOr<std::optional<absl::Status>> Read() {
     STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<StorageReader> reader, store_.NewReader());
     return reader->FindAnswer(number_);

@@ -83,6 +83,8 @@ EditRequest SettingDefaultProfile(const RobotProfile& profile) {
   return RequestOf(EditKind::kSetDefaultProfile, {}, std::move(bytes));
 }
 
+EditRequest DeletingMap() { return RequestOf(EditKind::kDeleteMap, {}, ""); }
+
 absl::Status CarryOut(const EditRequest& edit,
                       Integrator& integrator,
                       const Stop& stop,
@@ -104,6 +106,8 @@ absl::Status CarryOut(const EditRequest& edit,
       STRATA_ASSIGN_OR_RETURN(const RobotProfile profile, ProfileOf(edit));
       return integrator.SetDefaultProfile(profile, stop, also);
     }
+    case EditKind::kDeleteMap:
+      break;
   }
   return Unreadable(edit);
 }

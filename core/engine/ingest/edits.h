@@ -22,6 +22,8 @@ EditRequest SettingPose(const ScanId& id, const Pose& T_map_scan);
 EditRequest DeletingScan(const ScanId& id);
 EditRequest SettingLabels(const ScanId& id, const std::vector<std::uint16_t>& labels, bool update);
 EditRequest SettingDefaultProfile(const RobotProfile& profile);
+// For AskForEdit() only: no work of the worker's.
+EditRequest DeletingMap();
 
 // On the worker's thread. `also`: in the same commit.
 absl::Status CarryOut(const EditRequest& edit,
@@ -32,7 +34,7 @@ absl::Status CarryOut(const EditRequest& edit,
 // Where another engine has the map: asks that one by `store`, as of MapStores::OpenToAdd(), and
 // waits for its answer, by polling. `stop` takes the edit back unless it has been carried out;
 // `look`, once a second, does so with its error. UNAVAILABLE, outcome unknown, where the store is
-// away for ten seconds.
+// away for ten seconds; NOT_FOUND once the map was deleted.
 absl::Status AskForEdit(MapStorage& store,
                         const EditRequest& edit,
                         const Stop& stop,

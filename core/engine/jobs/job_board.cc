@@ -23,6 +23,7 @@
 #include "core/common/guarded.h"
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
+#include "core/engine/jobs/job_handlers.h"
 
 namespace strata {
 namespace {
@@ -41,9 +42,31 @@ absl::Status TakeFreeId(StorageReader& reader, JobInfo& job) {
 
 // Whether other engines may have made the stored state of the shown one.
 bool DecidedElsewhere(JobState shown, JobState stored) {
-  if (shown == JobState::kQueued) return stored == JobState::kCancelled;
+  if (shown == JobState::kQueued) return IsFinal(stored);
   return shown == JobState::kProposed &&
          (stored == JobState::kQueued || stored == JobState::kCancelled);
+}
+
+// Of the engine before, which ran them: here nobody does.
+absl::Status LeaveToWorkers(MapCore& core, const std::vector<JobInfo>& jobs) {
+  return core.writer().Run(
+      Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
+        for (const JobInfo& job : jobs) {
+          const bool left = job.state == JobState::kRunning && !RunsElsewhere(job);
+          if (!left || !RunsAnywhere(job.kind)) continue;
+          JobInfo queued = job;
+          queued.state = JobState::kQueued;
+          STRATA_RETURN_IF_ERROR(writer.PutJob(queued));
+        }
+        return absl::OkStatus();
+      });
+}
+
+// That another engine runs a job of the map: one at a time.
+absl::Status CheckNoneElsewhere(StorageReader& reader) {
+  STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, reader.ListJobs());
+  if (std::none_of(jobs.begin(), jobs.end(), &RunsElsewhere)) return absl::OkStatus();
+  return absl::AbortedError("another server runs a job of the map");
 }
 
 }  // namespace
@@ -67,13 +90,11 @@ class JobBoard::Running final : public JobContext {
     return absl::OkStatus();
   }
   const Stop& stop() const override { return stop_; }
-  void SetMetric(const std::string& name, double value) override { metrics_[name] = value; }
-  void SetMessage(std::string message) override { message_ = std::move(message); }
-  void SetProposed() override { proposed_ = true; }
+  void SetMetric(const std::string& name, double value) override { result_.metrics[name] = value; }
+  void SetMessage(std::string message) override { result_.message = std::move(message); }
+  void SetProposed() override { result_.proposed = true; }
 
-  std::map<std::string, double>& metrics() { return metrics_; }
-  std::string& message() { return message_; }
-  bool proposed() const { return proposed_; }
+  const JobResult& result() const { return result_; }
 
  private:
   JobBoard& board_;
@@ -83,9 +104,7 @@ class JobBoard::Running final : public JobContext {
   absl::Time reported_ = absl::InfinitePast();
   absl::Time stored_ = SteadyNow();
   std::string phase_;
-  std::map<std::string, double> metrics_;
-  std::string message_;
-  bool proposed_ = false;
+  JobResult result_;
 };
 
 // A job that is about to be queued: counted among those that wait.
@@ -121,10 +140,11 @@ absl::StatusOr<std::unique_ptr<JobBoard>> JobBoard::Open(MapCore& core, Quaranti
     STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
     STRATA_ASSIGN_OR_RETURN(stored, reader->ListJobs());
   }
+  if (!core.options().works) STRATA_RETURN_IF_ERROR(LeaveToWorkers(core, stored));
   std::unique_ptr<JobBoard> board(new JobBoard(core, quarantine));
   absl::MutexLock lock(&board->mutex_);
   for (JobInfo& info : stored) {
-    if (info.state == JobState::kRunning) info.state = JobState::kQueued;
+    if (info.state == JobState::kRunning && !RunsElsewhere(info)) info.state = JobState::kQueued;
     board->last_id_ = std::max(board->last_id_, info.id);
     auto entry = std::make_shared<Entry>();
     entry->info = std::move(info);
@@ -282,7 +302,9 @@ void JobBoard::TakeInOne(JobInfo&& stored, const AllShown& before) {
   }
   Entry& entry = *it->second;
   if (entry.changes != shown->second.changes) return;
-  if (!DecidedElsewhere(entry.info.state, stored.state)) return;
+  const bool ran_elsewhere = RunsElsewhere(entry.info) || RunsElsewhere(stored);
+  const bool news = stored.state != entry.info.state || stored.updated != entry.info.updated;
+  if (!(ran_elsewhere && news) && !DecidedElsewhere(entry.info.state, stored.state)) return;
   entry.info = std::move(stored);
   ++entry.changes;
 }
@@ -317,8 +339,9 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
     absl::StatusOr<JobInfo> cancelled =
         Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter&) -> absl::Status {
           if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
-          run = StopOfRun(job);
-          if (run.has_value()) {
+          const bool elsewhere = RunsElsewhere(job);
+          run = elsewhere ? std::nullopt : StopOfRun(job);
+          if (elsewhere || run.has_value()) {
             TellToEnd(job);
           } else {
             job.state = JobState::kCancelled;
@@ -403,6 +426,34 @@ bool JobBoard::AnyIn(JobState state) const {
   });
 }
 
+bool JobBoard::AnyElsewhere() const {
+  absl::MutexLock lock(&mutex_);
+  return std::any_of(jobs_.begin(), jobs_.end(), [](const auto& entry) {
+    return RunsElsewhere(entry.second->info);
+  });
+}
+
+absl::Status JobBoard::ReturnDead(const std::set<std::string>& alive) {
+  std::map<std::uint64_t, std::string> dead;  // run_by, by id
+  {
+    absl::MutexLock lock(&mutex_);
+    for (const auto& [id, entry] : jobs_) {
+      if (!RunsElsewhere(entry->info)) continue;
+      std::string run_by = RunBy(entry->info);
+      if (!alive.contains(HolderOf(run_by))) dead.emplace(id, std::move(run_by));
+    }
+  }
+  for (const auto& [id, run_by] : dead) {
+    const absl::Status returned =
+        Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) {
+          if (RunsElsewhere(job) && RunBy(job) == run_by) return ReturnDeadJob(job, writer);
+          return absl::AbortedError("it has ended, or is run by another");
+        }).status();
+    if (!absl::IsAborted(returned)) STRATA_RETURN_IF_ERROR(returned);
+  }
+  return absl::OkStatus();
+}
+
 bool JobBoard::LastIsQuarantined(absl::string_view kind) const {
   absl::MutexLock lock(&mutex_);
   const auto last = std::find_if(jobs_.rbegin(), jobs_.rend(), [kind](const auto& entry) {
@@ -418,8 +469,11 @@ std::optional<std::uint64_t> JobBoard::NextId() const {
 
 std::optional<std::uint64_t> JobBoard::NextIdLocked() const {
   std::optional<std::pair<std::uint64_t, std::uint64_t>> next;  // last turn of its owner, id
+  const bool works = core_.options().works;
   for (const auto& [id, entry] : jobs_) {
+    if (RunsElsewhere(entry->info)) return std::nullopt;
     if (entry->info.state != JobState::kQueued) continue;
+    if (!works && RunsAnywhere(entry->info.kind)) continue;
     const auto turn = turns_.find(entry->owner);
     const std::pair mine(turn == turns_.end() ? 0 : turn->second, id);
     if (!next.has_value() || mine < *next) next = mine;
@@ -466,12 +520,15 @@ absl::StatusOr<std::optional<JobInfo>> JobBoard::TakeNext(Stop& stop) {
     absl::StatusOr<JobInfo> taken =
         Change(id, Durability::kRelaxed, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
           if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
+          if (!core_.options().store.empty()) {
+            STRATA_RETURN_IF_ERROR(CheckNoneElsewhere(writer.reader()));
+          }
           told_to_end = IsToldToEnd(job);
           job.state = JobState::kRunning;
           return quarantine_.Begin(writer, work);
         });
     if (absl::IsAborted(taken.status())) {  // it was cancelled, maybe by another engine
-      STRATA_RETURN_IF_ERROR(TakeIn(id).status());
+      STRATA_RETURN_IF_ERROR(TakeIn().status());
       continue;
     }
     STRATA_RETURN_IF_ERROR(taken.status());
@@ -506,17 +563,7 @@ absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Runni
   return Change(id,
                 Durability::kFull,
                 [&](JobInfo& job, StorageWriter& writer) {
-                  for (const auto& [name, value] : context.metrics()) job.metrics[name] = value;
-                  job.phase.clear();
-                  ForgetToldToEnd(job);
-                  if (ended.ok()) {
-                    job.state = context.proposed() ? JobState::kProposed : JobState::kSucceeded;
-                    job.progress = 1.0;
-                    job.message = context.message();
-                  } else {
-                    job.state = absl::IsCancelled(ended) ? JobState::kCancelled : JobState::kFailed;
-                    job.message = std::string(ended.message());
-                  }
+                  EndJob(job, ended, context.result());
                   return quarantine_.End(writer, work);
                 })
       .status();

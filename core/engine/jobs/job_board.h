@@ -38,7 +38,8 @@ inline constexpr std::size_t kKeptJobs = 1'000;
 // once one wins, and whoever is told of it is told what happens. Thread-safe.
 class JobBoard {
  public:
-  // Reads the jobs of the map; those that were running are queued again. `quarantine` is told what
+  // Reads the jobs of the map; those that were running are queued again, unless another engine runs
+  // them. `quarantine` is told what
   // is under way, and must outlive the board.
   static absl::StatusOr<std::unique_ptr<JobBoard>> Open(MapCore& core, Quarantine& quarantine);
 
@@ -62,9 +63,13 @@ class JobBoard {
                      std::uint64_t id,
                      absl::FunctionRef<absl::Status(const JobInfo&)> sink) const;
   bool AnyIn(JobState state) const;
+  // Of jobs that other engines run: whether there are any; those whose engine is not of `alive`
+  // wait again.
+  bool AnyElsewhere() const;
+  absl::Status ReturnDead(const std::set<std::string>& alive);
   // Whether the newest job of the kind is in quarantine: no other begins by itself.
   bool LastIsQuarantined(absl::string_view kind) const;
-  // Whose turn it is, if any waits.
+  // Whose turn it is, if any waits that this engine runs, and no other engine runs one of the map.
   std::optional<std::uint64_t> NextId() const;
   // Tells the running job to end; see RunNext().
   void StopRunning();

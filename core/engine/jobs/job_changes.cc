@@ -3,12 +3,14 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 
 #include "core/common/status.h"
 #include "core/engine/map/job_context.h"
+#include "core/engine/map/quarantine.h"
 
 namespace strata {
 namespace {
@@ -50,6 +52,59 @@ absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer) {
   job.state = JobState::kCancelled;
   job.message = std::string("proposal discarded");
   return writer.DiscardProposal(job.id);
+}
+
+void EndJob(JobInfo& job, const absl::Status& ended, const JobResult& result) {
+  for (const auto& [name, value] : result.metrics) job.metrics[name] = value;
+  job.phase.clear();
+  ForgetToldToEnd(job);
+  job.parameters.erase(kRunBy);
+  if (ended.ok()) {
+    job.state = result.proposed ? JobState::kProposed : JobState::kSucceeded;
+    job.progress = 1.0;
+    job.message = result.message;
+  } else {
+    job.state = absl::IsCancelled(ended) ? JobState::kCancelled : JobState::kFailed;
+    job.message = std::string(ended.message());
+  }
+}
+
+bool RunsElsewhere(const JobInfo& job) {
+  return job.state == JobState::kRunning && job.parameters.contains(kRunBy);
+}
+
+std::string RunBy(const JobInfo& job) {
+  const auto found = job.parameters.find(kRunBy);
+  return found == job.parameters.end() ? "" : found->second;
+}
+
+std::string HolderOf(absl::string_view run_by) {
+  return std::string(run_by.substr(0, run_by.find('/')));
+}
+
+absl::Status ReturnDeadJob(JobInfo& job, StorageWriter& writer) {
+  const WorkId work{WorkKind::kJob, job.id};
+  if (IsToldToEnd(job)) {
+    EndJob(job, absl::CancelledError("the server that ran it died"), {});
+    return writer.DeleteAttempt(work);
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, writer.reader().ListAttempts());
+  Attempt attempt{work, 0, false};
+  for (const Attempt& one : attempts) {
+    if (one.work == work) attempt.deaths = one.deaths;
+  }
+  ++attempt.deaths;
+  job.state = JobState::kQueued;
+  job.parameters.erase(kRunBy);
+  if (attempt.deaths >= kMostDeathsOfMany) {
+    EndJob(job,
+           absl::InternalError(absl::StrCat(kQuarantined,
+                                            attempt.deaths,
+                                            " servers died while they ran it; stratad quarantine "
+                                            "release takes it back")),
+           {});
+  }
+  return writer.PutAttempt(attempt);
 }
 
 void TellToEnd(JobInfo& job) { job.parameters.emplace(kToldToEnd, "1"); }

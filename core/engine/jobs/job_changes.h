@@ -4,10 +4,13 @@
 #define STRATA_CORE_ENGINE_JOBS_JOB_CHANGES_H_
 
 #include <cstdint>
+#include <map>
+#include <string>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
 #include "core/storage/storage.h"
@@ -30,6 +33,23 @@ absl::StatusOr<JobInfo> ChangeStoredJob(StorageWriter& writer,
 absl::Status AcceptProposal(JobInfo& job, StorageWriter& writer);
 // Ends a proposed job as cancelled and forgets its proposal. FAILED_PRECONDITION.
 absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer);
+
+// What a run of a job told.
+struct JobResult {
+  std::map<std::string, double> metrics;
+  std::string message;
+  bool proposed = false;
+};
+// The job has ended so.
+void EndJob(JobInfo& job, const absl::Status& ended, const JobResult& result);
+
+// Of a job that a server runs that has not got the map (kRunBy).
+bool RunsElsewhere(const JobInfo& job);
+std::string RunBy(const JobInfo& job);
+std::string HolderOf(absl::string_view run_by);
+// The server that ran it so has died: the job waits again, has ended if it was told to, or is put
+// aside if that was the last of many deaths. Inside a commit that puts the job afterwards.
+absl::Status ReturnDeadJob(JobInfo& job, StorageWriter& writer);
 
 // Of a job that runs: whoever runs it, or would run it again, ends it.
 void TellToEnd(JobInfo& job);

@@ -52,7 +52,7 @@ absl::Status NeedsFreeName(StorageReader& reader, const JobArguments& arguments)
 
 // On the worker's thread, between its batches.
 absl::Status RunOnWorker(const JobRun& run, Worker::Command command) {
-  return run.worker.Execute(
+  return run.worker->Execute(
       run.context.stop(), command, absl::StrCat("job ", run.job.id, " (", run.job.kind, ")"));
 }
 
@@ -63,13 +63,19 @@ absl::Status RunRebuild(const JobRun& run) {
 }
 
 absl::Status RunVerify(const JobRun& run) {
-  // A map whose tiles are not usable makes them before it takes commands.
-  STRATA_RETURN_IF_ERROR(RunOnWorker(run, [](Integrator&) { return absl::OkStatus(); }));
+  if (run.worker == nullptr) {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, run.core.Reader());
+    STRATA_ASSIGN_OR_RETURN(const MapClock clock, reader->GetClock());
+    if (!clock.derived_complete) return absl::UnavailableError("its tiles are being made again");
+  } else {
+    // A map whose tiles are not usable makes them before it takes commands.
+    STRATA_RETURN_IF_ERROR(RunOnWorker(run, [](Integrator&) { return absl::OkStatus(); }));
+  }
   return RunVerifyJob(run.core, ThreadsOf(run.arguments, run.core.options()), run.context);
 }
 
 absl::Status RunOptimize(const JobRun& run) {
-  return RunOptimizeJob(run.core, run.worker, run.job, run.arguments, run.context);
+  return RunOptimizeJob(run.core, *run.worker, run.job, run.arguments, run.context);
 }
 
 absl::Status RunRevert(const JobRun& run) {
@@ -84,7 +90,7 @@ absl::Status RunTrain(const JobRun& run) {
 }
 
 absl::Status RunClassify(const JobRun& run) {
-  return RunClassifyJob(run.core, run.worker, run.arguments.Text("model"), run.context);
+  return RunClassifyJob(run.core, *run.worker, run.arguments.Text("model"), run.context);
 }
 
 absl::Status RunEvaluate(const JobRun& run) {
@@ -104,7 +110,7 @@ absl::Status RunComplete(const JobRun& run) {
 }
 
 absl::Status RunFade(const JobRun& run) {
-  return RunFadeJob(run.core, run.worker, run.arguments, run.context);
+  return RunFadeJob(run.core, *run.worker, run.arguments, run.context);
 }
 
 }  // namespace
@@ -112,18 +118,33 @@ absl::Status RunFade(const JobRun& run) {
 const std::vector<JobHandler>& JobHandlers() {
   static const auto* const handlers = new std::vector<JobHandler>{
       {kRebuildJob, NeedsNothing, RunRebuild},
-      {kVerifyJob, NeedsNothing, RunVerify},
+      {kVerifyJob, NeedsNothing, RunVerify, /*anywhere=*/true},
       {kOptimizeJob, NeedsNothing, RunOptimize},
       {kRevertJob, NeedsNothing, RunRevert},
-      {kTrainJob, NeedsFreeName, RunTrain},
+      {kTrainJob, NeedsFreeName, RunTrain, /*anywhere=*/true},
       {kClassifyJob, NeedsClassifier, RunClassify},
-      {kEvaluateJob, NeedsClassifier, RunEvaluate},
+      {kEvaluateJob, NeedsClassifier, RunEvaluate, /*anywhere=*/true},
       {kFadeJob, NeedsPoints, RunFade},
-      {kPlanesJob, NeedsPoints, RunPlanes},
+      {kPlanesJob, NeedsPoints, RunPlanes, /*anywhere=*/true},
       {kObjectsJob, NeedsPointsAndClass, RunObjects},
       {kCompleteJob, NeedsPoints, RunComplete},
   };
   return *handlers;
+}
+
+bool RunsAnywhere(absl::string_view kind) {
+  const absl::StatusOr<const JobHandler*> handler = FindJobHandler(kind);
+  return handler.ok() && (*handler)->anywhere;
+}
+
+absl::Status RunHandler(MapCore& core, Worker* worker, const JobInfo& job, JobContext& context) {
+  STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(job.kind));
+  JobParameters parameters = job.parameters;
+  // Of no kind.
+  parameters.erase(kAccepted);
+  parameters.erase(kRunBy);
+  STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(job.kind, parameters));
+  return handler->run({core, worker, job, arguments, context});
 }
 
 absl::StatusOr<const JobHandler*> FindJobHandler(absl::string_view kind) {

@@ -20,7 +20,7 @@ namespace strata {
 // A job whose turn it is.
 struct JobRun {
   MapCore& core;
-  Worker& worker;
+  Worker* worker;  // nullptr: another engine has the map
   const JobInfo& job;
   const JobArguments& arguments;  // of job.parameters
   JobContext& context;
@@ -33,12 +33,19 @@ struct JobHandler {
   absl::Status (*check)(StorageReader& reader, const JobArguments& arguments);
   // On the thread of jobs.
   absl::Status (*run)(const JobRun& run);
+  // It asks nothing of who has the map: whatever engine can run it, on `core` alone.
+  bool anywhere = false;
 };
 
 // One of each of JobKinds().
 const std::vector<JobHandler>& JobHandlers();
 // INVALID_ARGUMENT for a kind that there is not.
 absl::StatusOr<const JobHandler*> FindJobHandler(absl::string_view kind);
+
+// Whether jobs of the kind can be run by an engine that has not got the map.
+bool RunsAnywhere(absl::string_view kind);
+// Does what the job asks for. `worker` as of JobRun.
+absl::Status RunHandler(MapCore& core, Worker* worker, const JobInfo& job, JobContext& context);
 
 }  // namespace strata
 

@@ -63,7 +63,7 @@ JobRunner::JobRunner(
       worker_(worker),
       closures_(core, seen),
       seen_(seen),
-      job_waits_(jobs.AnyIn(JobState::kQueued)),
+      job_waits_(jobs.NextId().has_value()),
       next_look_(core.options().optimize_interval > absl::ZeroDuration()
                      ? SteadyNow() + core.options().optimize_interval
                      : absl::InfiniteFuture()),
@@ -79,11 +79,7 @@ absl::Status JobRunner::Run(const JobInfo& job, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const bool done, HasMadeItsEpoch(core_, job, context));
   if (done) return absl::OkStatus();
   STRATA_RETURN_IF_ERROR(context.stop().status());  // it was cancelled before a restart
-  STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(job.kind));
-  JobParameters parameters = job.parameters;
-  parameters.erase(kAccepted);  // the board's, of no kind
-  STRATA_ASSIGN_OR_RETURN(const JobArguments arguments, ReadJobArguments(job.kind, parameters));
-  return handler->run({core_, worker_, job, arguments, context});
+  return RunHandler(core_, &worker_, job, context);
 }
 
 JobRunner::Step JobRunner::NextStep() {
@@ -128,7 +124,7 @@ void JobRunner::RunJob() {
         closing_, [this](const JobInfo& job, JobContext& context) { return Run(job, context); });
   });
   absl::MutexLock lock(&mutex_);
-  job_waits_ = jobs_.AnyIn(JobState::kQueued);
+  job_waits_ = jobs_.NextId().has_value();
   if (done.ok()) return;
   LogError("job", core_.name(), done);
   mutex_.AwaitWithTimeout(absl::Condition(&closed_), kRetryDelay);
@@ -175,7 +171,7 @@ void JobRunner::Look() {
   if (failed) LogError("look", core_.name(), done);
   absl::MutexLock lock(&mutex_);
   look_failed_ = failed;
-  job_waits_ = jobs_.AnyIn(JobState::kQueued);
+  job_waits_ = jobs_.NextId().has_value();
 }
 
 void JobRunner::PlanNextLook(absl::Time begun) {

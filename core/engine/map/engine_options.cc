@@ -17,6 +17,10 @@ absl::Status EngineOptions::Validate() const {
   if (!store.empty() && max_map_bytes > 0) {
     faults.emplace_back("max_map_bytes is set, but the maps are in a database");
   }
+  if (store.empty() && !(integrates && works)) {
+    faults.emplace_back(
+        "integrates and works are not set, but nobody else has the directory's maps");
+  }
   if (map_lease < absl::Seconds(1) || map_lease > absl::Hours(1)) {
     faults.push_back(
         absl::StrCat("map_lease = ", absl::FormatDuration(map_lease), " is not in [1s, 1h]"));
@@ -53,6 +57,11 @@ absl::Status EngineOptions::Validate() const {
   }
   if (faults.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("engine: ", absl::StrJoin(faults, "; ")));
+}
+
+std::string RolesOf(const EngineOptions& options) {
+  return absl::StrCat(
+      "gateway", options.integrates ? ",integrator" : "", options.works ? ",worker" : "");
 }
 
 }  // namespace strata

@@ -24,6 +24,13 @@ struct EngineOptions {
   std::string store;
   // What other engines on `store` tell people of this one; empty: its directory's identity.
   std::string server_name;
+  // Whether it takes maps of `store`, integrates their scans and runs those of their jobs that
+  // change tiles or poses. Else it answers what can be answered beside those that do. Set without
+  // `store`.
+  bool integrates = true;
+  // Whether it runs jobs of other kinds: of its own maps, and on `store` of any. Set without
+  // `store`.
+  bool works = true;
   // How long an engine that does not answer keeps its maps from others on `store`; in [1 s, 1 h].
   absl::Duration map_lease = absl::Seconds(10);
   // Larger scans are refused.
@@ -77,6 +84,9 @@ struct EngineOptions {
   // INVALID_ARGUMENT naming every field out of its range.
   absl::Status Validate() const;
 };
+
+// What an engine does, as others on its store are told: "gateway,integrator,worker".
+std::string RolesOf(const EngineOptions& options);
 
 }  // namespace strata
 

@@ -70,8 +70,15 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
                                                        StoredMap stored,
                                                        const EngineOptions& options,
                                                        std::shared_ptr<CacheBudget> caches) {
+  STRATA_RETURN_IF_ERROR(ClearLeftovers(stored.storage->writer()));
+  return OpenBeside(name, std::move(stored), options, std::move(caches));
+}
+
+absl::StatusOr<std::unique_ptr<MapCore>> MapCore::OpenBeside(const std::string& name,
+                                                             StoredMap stored,
+                                                             const EngineOptions& options,
+                                                             std::shared_ptr<CacheBudget> caches) {
   StorageWriter& writer = stored.storage->writer();
-  STRATA_RETURN_IF_ERROR(ClearLeftovers(writer));
   STRATA_ASSIGN_OR_RETURN(MapInfo info, writer.reader().GetMapInfo());
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
   info.name = name;

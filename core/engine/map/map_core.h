@@ -48,6 +48,12 @@ class MapCore {
                                                        const std::filesystem::path& file,
                                                        const EngineOptions& options,
                                                        std::shared_ptr<CacheBudget> caches);
+  // For a job that runs while another engine has the map: clears nothing, and what the other
+  // publishes meanwhile is not seen. `stored` as of MapStores::OpenToWork().
+  static absl::StatusOr<std::unique_ptr<MapCore>> OpenBeside(const std::string& name,
+                                                             StoredMap stored,
+                                                             const EngineOptions& options,
+                                                             std::shared_ptr<CacheBudget> caches);
   ~MapCore() { Close(); }
 
   const std::string& name() const { return name_; }

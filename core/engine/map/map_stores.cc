@@ -116,12 +116,26 @@ class PostgresStores final : public MapStores {
                                                         std::uint64_t most_waiting) const override {
     return maps_.OpenToAdd(name, most_waiting);
   }
+  absl::Status CheckTaken(absl::string_view name) const override { return maps_.Offer(name); }
   absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const override {
     return maps_.ListWaiting();
   }
   absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> ListClocks(
       const std::vector<std::string>& names) const override {
     return maps_.ListClocks(names);
+  }
+  absl::StatusOr<std::vector<LiveServer>> ListServers() const override {
+    return maps_.ListServers();
+  }
+  absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const override {
+    return maps_.ListUnfinishedJobs();
+  }
+  absl::StatusOr<StoredMap> OpenToWork(absl::string_view name,
+                                       std::uint64_t job,
+                                       absl::string_view run_by) const override {
+    STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapStorage> storage,
+                            maps_.OpenToWork(name, job, run_by));
+    return StoredMap{std::move(storage), {}};
   }
   bool IsShared() const override { return true; }
   absl::StatusOr<bool> Has(absl::string_view name) const override { return maps_.Has(name); }
@@ -135,6 +149,10 @@ class PostgresStores final : public MapStores {
     const absl::Status deleted = maps_.Delete(name);
     return absl::IsNotFound(deleted) ? absl::OkStatus() : deleted;
   }
+  absl::Status DeleteAsAsked(absl::string_view name) const override {
+    return maps_.DeleteAsAsked(name);
+  }
+  absl::Status FinishDeletions() const override { return maps_.FinishDeletions(); }
   std::filesystem::path FileOf(absl::string_view) const override { return {}; }
 
  private:
@@ -163,6 +181,7 @@ absl::StatusOr<PostgresOptions> DatabaseOf(const EngineOptions& options,
   STRATA_ASSIGN_OR_RETURN(database.lease.holder, directory.Identity());
   database.lease.server = options.server_name;
   database.lease.time = options.map_lease;
+  database.lease.roles = RolesOf(options);
   return database;
 }
 

@@ -61,8 +61,8 @@ class MapStores {
   virtual absl::Status Create(absl::string_view name,
                               const MapParameters& parameters,
                               absl::Time created) const = 0;
-  // For this engine alone. UNAVAILABLE with MapOwnerOf() while another engine has it, which can be
-  // where IsShared() only.
+  // For this engine alone. UNAVAILABLE with MapOwnerOf() while another engine has it, or always
+  // where EngineOptions::integrates is not set; both can be where IsShared() only.
   virtual absl::StatusOr<StoredMap> Open(absl::string_view name) const = 0;
   // Of shared ones: for reading only, whoever has it.
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToRead(absl::string_view name) const {
@@ -71,14 +71,30 @@ class MapStores {
   // Of shared ones: for what comes in here while another engine has the map alone:
   // PutScan() is RESOURCE_EXHAUSTED while `most_waiting` wait for integration, and UNAVAILABLE
   // where chunks of the scan have gone, which have to be sent again. UNAVAILABLE while nobody has
-  // it alone.
+  // it alone, unless this engine takes none.
   virtual absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                                 std::uint64_t) const {
     return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
+  // For a call that waits for another engine: OK where one has the map, or will soon. UNAVAILABLE
+  // where none takes it.
+  virtual absl::Status CheckTaken(absl::string_view) const { return absl::OkStatus(); }
   // Of shared ones: maps that this engine has alone and in which scans, jobs or edits wait.
   virtual absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const {
     return std::vector<WaitingMap>();
+  }
+  // Of shared ones: engines that live; jobs that wait or run, of all maps; a map for a job that is
+  // run here while another engine has it, as of PostgresMaps::OpenToWork().
+  virtual absl::StatusOr<std::vector<LiveServer>> ListServers() const {
+    return std::vector<LiveServer>();
+  }
+  virtual absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const {
+    return std::vector<UnfinishedJob>();
+  }
+  virtual absl::StatusOr<StoredMap> OpenToWork(absl::string_view name,
+                                               std::uint64_t,
+                                               absl::string_view) const {
+    return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
   }
   // Whether other engines use the same stores: maps may come, go and change beside this one.
   virtual bool IsShared() const { return false; }
@@ -96,6 +112,12 @@ class MapStores {
   virtual absl::Status CheckRemovable(absl::string_view name) const = 0;
   // The map must be closed. `clock`: where it stood; 0: unknown. OK also where there is nothing.
   virtual absl::Status Delete(absl::string_view name, std::uint64_t clock) const = 0;
+  // Of shared ones: as another engine asks for it by an edit, EditKind::kDeleteMap, which is over
+  // with it; ABORTED where it waits no more. The rest of what was deleted so, for who has asked.
+  virtual absl::Status DeleteAsAsked(absl::string_view name) const {
+    return absl::UnimplementedError(absl::StrCat("map ", name, ": its store is not shared"));
+  }
+  virtual absl::Status FinishDeletions() const { return absl::OkStatus(); }
   // As of StoredMap, of a map that need not be there.
   virtual std::filesystem::path FileOf(absl::string_view name) const = 0;
 };

@@ -9,10 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/random/random.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 
@@ -32,6 +35,26 @@ constexpr absl::Duration kRetry = absl::Seconds(1);
 std::int64_t RandomToken() {
   absl::BitGen random;
   return absl::Uniform<std::int64_t>(random, 1, std::int64_t{1} << 62);
+}
+
+// Who has a map that is offered to those who take maps; empty: no process.
+constexpr char kNobody[] = "";
+
+absl::Status OpenNowhere(absl::string_view name, absl::string_view why) {
+  return WithRetryDelay(
+      WithMapOwner(absl::UnavailableError(absl::StrCat("map ", name, " is open in no server", why)),
+                   "nobody"),
+      kRetry);
+}
+
+absl::StatusOr<bool> AnyTakesMaps(Connection& connection) {
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      connection.Query("SELECT EXISTS (SELECT FROM map_server WHERE expires > clock_timestamp() "
+                       "AND $1 = ANY (string_to_array(roles, ',')))",
+                       absl::string_view(kIntegratorRole)));
+  row.Next();
+  return row.Bool(0);
 }
 
 absl::Status HeldBy(absl::string_view name, absl::string_view server) {
@@ -91,6 +114,68 @@ MapLeases::~MapLeases() {
   thread_.join();
 }
 
+bool MapLeases::takes_maps() const {
+  return options_.roles.empty() ||
+         absl::c_linear_search(std::vector<std::string>(absl::StrSplit(options_.roles, ',')),
+                               kIntegratorRole);
+}
+
+absl::Status MapLeases::RenewServer(Connection& connection, bool leaves) const {
+  if (leaves) {
+    return connection.Change("DELETE FROM map_server WHERE holder = $1", options_.holder).status();
+  }
+  return connection
+      .Change(
+          "INSERT INTO map_server AS s (holder, server, roles, expires) VALUES ($1, $2, $3, "
+          "clock_timestamp() + $4 * interval '1 second') ON CONFLICT (holder) DO UPDATE SET server "
+          "= $2, roles = $3, expires = excluded.expires",
+          options_.holder,
+          options_.server,
+          options_.roles,
+          absl::ToDoubleSeconds(options_.time))
+      .status();
+}
+
+// Those that died are shown for a day.
+absl::Status MapLeases::Announce(Connection& connection) {
+  if (options_.roles.empty()) return absl::OkStatus();
+  STRATA_RETURN_IF_ERROR(connection.Execute(
+      "DELETE FROM map_server WHERE expires < clock_timestamp() - interval '1 day'"));
+  STRATA_RETURN_IF_ERROR(RenewServer(connection, /*leaves=*/false));
+  absl::MutexLock lock(&mutex_);
+  announced_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status MapLeases::Refuse(Connection& connection,
+                               std::int64_t map,
+                               absl::string_view name) const {
+  STRATA_RETURN_IF_ERROR(CheckNobodyHas(connection, map, name));
+  return OpenNowhere(name, ", and this one takes none (--role)");
+}
+
+// The lease of nobody ended long ago: whoever takes maps finds it as that of a server that died.
+absl::Status MapLeases::Offer(Connection& connection,
+                              std::int64_t map,
+                              absl::string_view name) const {
+  const absl::Status held = CheckNobodyHas(connection, map, name);
+  if (MapOwnerOf(held).has_value()) return absl::OkStatus();
+  STRATA_RETURN_IF_ERROR(held);
+  STRATA_RETURN_IF_ERROR(
+      connection
+          .Change("INSERT INTO map_lease (map, token, holder, server, expires) SELECT $1, 0, $2, "
+                  "'nobody', to_timestamp(0) WHERE EXISTS (SELECT FROM map_place WHERE map = $1) "
+                  "ON CONFLICT DO NOTHING",
+                  map,
+                  absl::string_view(kNobody))
+          .status());
+  STRATA_ASSIGN_OR_RETURN(const bool any, AnyTakesMaps(connection));
+  if (any) return absl::OkStatus();
+  return OpenNowhere(
+      name,
+      absl::StrCat(", and none on this store takes maps: start one with --role ", kIntegratorRole));
+}
+
 absl::Status MapLeases::CheckFree(Connection& connection,
                                   std::int64_t map,
                                   absl::string_view name) const {
@@ -106,7 +191,7 @@ absl::Status MapLeases::CheckFree(Connection& connection,
 absl::StatusOr<LastOwner> MapLeases::LastOwnerOf(Connection& connection, std::int64_t map) const {
   STRATA_ASSIGN_OR_RETURN(
       Rows row, connection.Query("SELECT holder FROM map_lease WHERE map = $1 FOR UPDATE", map));
-  if (!row.Next()) return LastOwner::kNobody;
+  if (!row.Next() || row.Text(0) == kNobody) return LastOwner::kNobody;
   return row.Text(0) == options_.holder ? LastOwner::kSelf : LastOwner::kOther;
 }
 
@@ -236,20 +321,25 @@ void MapLeases::Loop() {
   while (true) {
     Leases leases;
     bool closed = false;
+    bool announced = false;
     {
       absl::MutexLock lock(&mutex_);
       mutex_.AwaitWithTimeout(absl::Condition(this, &MapLeases::HasToAct), options_.time / 3);
       for (const auto& [token, lease] : held_) leases.push_back(lease);
       closed = closed_;
       taken_ = false;
-      if (closed && given_up_.empty()) return;
-      if (leases.empty() && given_up_.empty()) continue;
+      announced = announced_;
+      if (HasNothing(leases)) {
+        if (closed) return;
+        continue;
+      }
     }
     // What fails is tried again in its time; until then the leases say themselves that they end.
     const absl::Status done = Guarded([&, this]() -> absl::Status {
       STRATA_ASSIGN_OR_RETURN(Connection* const connection, Connected());
       STRATA_RETURN_IF_ERROR(Renew(*connection, leases));
-      return DropGivenUp(*connection);
+      STRATA_RETURN_IF_ERROR(DropGivenUp(*connection));
+      return announced ? RenewServer(*connection, closed) : absl::OkStatus();
     });
     if (closed) return;
     if (done.ok()) continue;

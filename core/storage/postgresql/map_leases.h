@@ -23,12 +23,19 @@
 
 namespace strata {
 
+// What a server does that others on its database have to know of: it takes maps; it runs jobs of
+// maps that others have.
+inline constexpr char kIntegratorRole[] = "integrator";
+inline constexpr char kWorkerRole[] = "worker";
+
 struct LeaseOptions {
   // Who this process is: the same for one that ended and was started again, which gets its maps
   // back at once, and no other's. Empty: drawn at random.
   std::string holder;
   // What others say of it to people.
   std::string server;
+  // What it does, with commas between; empty: it is no server, and nobody is told of it.
+  std::string roles;
   // How long a lease lasts from its last renewal; renewed three times as often.
   absl::Duration time = absl::Seconds(10);
 };
@@ -69,6 +76,16 @@ class MapLeases {
 
   const std::string& holder() const { return options_.holder; }
   absl::Duration time() const { return options_.time; }
+  // Whether it may take maps.
+  bool takes_maps() const;
+
+  // Tells others of this server, now and as long as it lives.
+  absl::Status Announce(Connection& connection);
+  // That this server takes no maps, and nobody has this one, or who has it. Never OK.
+  absl::Status Refuse(Connection& connection, std::int64_t map, absl::string_view name) const;
+  // OK where somebody has the map or will soon: one that nobody has is offered to those who take
+  // maps. UNAVAILABLE where none lives.
+  absl::Status Offer(Connection& connection, std::int64_t map, absl::string_view name) const;
 
   // Whose lease there is, in whatever state.
   absl::StatusOr<LastOwner> LastOwnerOf(Connection& connection, std::int64_t map) const;
@@ -93,6 +110,10 @@ class MapLeases {
   bool HasToAct() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
     return closed_ || taken_ || !given_up_.empty();
   }
+  bool HasNothing(const Leases& leases) const ABSL_SHARED_LOCKS_REQUIRED(mutex_) {
+    return leases.empty() && given_up_.empty() && !announced_;
+  }
+  absl::Status RenewServer(Connection& connection, bool leaves) const;
   absl::Status DropGivenUp(Connection& connection);
   absl::Status Renew(Connection& connection, const Leases& leases) const;
   // Of those that could not be renewed: which are another's by now.
@@ -106,6 +127,7 @@ class MapLeases {
   std::map<std::int64_t, std::shared_ptr<MapLease>> held_ ABSL_GUARDED_BY(mutex_);  // by token
   std::map<std::int64_t, std::int64_t> given_up_ ABSL_GUARDED_BY(mutex_);           // maps by token
   bool taken_ ABSL_GUARDED_BY(mutex_) = false;  // one that may be old already: it was waited for
+  bool announced_ ABSL_GUARDED_BY(mutex_) = false;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };

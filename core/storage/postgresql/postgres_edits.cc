@@ -59,10 +59,11 @@ absl::StatusOr<std::optional<EditRequest>> PostgresReader::FindEdit(std::uint64_
       Rows row,
       Ask("SELECT number, kind, trajectory, sequence, value, begun FROM map_edit WHERE map = $1 "
           "AND "
-          "number > $2 AND number <= $3 AND answer IS NULL AND made > clock_timestamp() - interval "
-          "'1 hour' ORDER BY number LIMIT 1",
+          "number > $2 AND number <= $3 AND answer IS NULL AND kind <> $4 AND made > "
+          "clock_timestamp() - interval '1 hour' ORDER BY number LIMIT 1",
           after,
-          until));
+          until,
+          static_cast<int>(EditKind::kDeleteMap)));
   if (!row.Next()) return std::nullopt;
   EditRequest edit;
   edit.number = row.Unsigned(0);
@@ -74,7 +75,9 @@ absl::StatusOr<std::optional<EditRequest>> PostgresReader::FindEdit(std::uint64_
 }
 
 absl::StatusOr<std::uint64_t> PostgresReader::LastEdit() {
-  return AskForNumber(Ask("SELECT max(number) FROM map_edit WHERE map = $1 AND answer IS NULL"));
+  return AskForNumber(
+      Ask("SELECT max(number) FROM map_edit WHERE map = $1 AND answer IS NULL AND kind <> $2",
+          static_cast<int>(EditKind::kDeleteMap)));
 }
 
 absl::StatusOr<std::optional<absl::Status>> PostgresReader::FindAnswer(std::uint64_t edit) {

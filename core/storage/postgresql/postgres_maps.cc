@@ -8,11 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
@@ -181,15 +183,12 @@ absl::Status DropOtherDerived(StorageWriter& writer, ConnectionPool& pool, std::
 
 absl::StatusOr<PostgresMaps> PostgresMaps::Connect(const PostgresOptions& options) {
   PostgresMaps maps(ConnectionPool::Make(options.where, options.max_connections), options);
-  std::vector<std::int64_t> going;
   {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, maps.pool_->Take());
     STRATA_RETURN_IF_ERROR(MakeTables(*lease));
-    STRATA_ASSIGN_OR_RETURN(Rows rows,
-                            lease->Query("SELECT map FROM map_place WHERE state = $1", kGoing));
-    while (rows.Next()) going.push_back(rows.Int(0));
+    STRATA_RETURN_IF_ERROR(maps.leases_->Announce(*lease));
   }
-  for (const std::int64_t map : going) STRATA_RETURN_IF_ERROR(maps.DeleteRows(map));
+  STRATA_RETURN_IF_ERROR(maps.FinishDeletions());
   return maps;
 }
 
@@ -323,9 +322,11 @@ absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToAdd(
   STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
   {
     STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
-    const absl::Status held = CheckNobodyHas(*lease, number, name);
-    if (held.ok()) return absl::UnavailableError(absl::StrCat("nobody has map ", name));
-    if (!MapOwnerOf(held).has_value()) return held;
+    const bool takes = leases_->takes_maps();
+    const absl::Status held =
+        takes ? CheckNobodyHas(*lease, number, name) : leases_->Offer(*lease, number, name);
+    if (takes && held.ok()) return absl::UnavailableError(absl::StrCat("nobody has map ", name));
+    if (!held.ok() && !MapOwnerOf(held).has_value()) return held;
   }
   OpenedMap map{.number = number, .name = std::string(name), .beside = most_waiting};
   map.patience = std::max(leases_->time(), absl::Seconds(1));
@@ -340,16 +341,64 @@ absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
           "SELECT * FROM (SELECT p.name, EXISTS (SELECT FROM truth_scan AS s WHERE s.map "
           "= l.map AND s.state = $3) AS scans, EXISTS (SELECT FROM truth_job AS j WHERE "
           "j.map = l.map AND j.state = $4) AS jobs, (SELECT max(e.number) FROM map_edit AS "
-          "e WHERE e.map = l.map AND e.answer IS NULL) AS edits FROM map_lease AS l JOIN "
-          "map_place AS p ON p.map = l.map WHERE l.holder = $1 AND p.state = $2) AS w "
-          "WHERE w.scans OR w.jobs OR w.edits > 0",
+          "e WHERE e.map = l.map AND e.answer IS NULL AND e.kind <> $5) AS edits, EXISTS (SELECT "
+          "FROM map_edit AS e WHERE e.map = l.map AND e.answer IS NULL AND e.kind = $5) AS "
+          "deletion FROM map_lease AS l JOIN map_place AS p ON p.map = l.map WHERE l.holder = $1 "
+          "AND p.state = $2) AS w WHERE w.scans OR w.jobs OR w.edits > 0 OR w.deletion",
           leases_->holder(),
           kThere,
           static_cast<int>(ScanState::kPending),
-          static_cast<int>(JobState::kQueued)));
+          static_cast<int>(JobState::kQueued),
+          static_cast<int>(EditKind::kDeleteMap)));
   std::vector<WaitingMap> waiting;
-  while (row.Next()) waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2), row.Unsigned(3)});
+  while (row.Next()) {
+    waiting.push_back({row.Text(0), row.Bool(1), row.Bool(2), row.Unsigned(3), row.Bool(4)});
+  }
   return waiting;
+}
+
+absl::StatusOr<std::vector<LiveServer>> PostgresMaps::ListServers() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query("SELECT holder, roles FROM map_server WHERE expires > clock_timestamp()"));
+  std::vector<LiveServer> servers;
+  while (row.Next()) {
+    const std::vector<std::string> roles = absl::StrSplit(row.Text(1), ',');
+    servers.push_back({row.Text(0), absl::c_linear_search(roles, kWorkerRole)});
+  }
+  return servers;
+}
+
+absl::StatusOr<std::vector<UnfinishedJob>> PostgresMaps::ListUnfinishedJobs() const {
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      lease->Query(
+          "SELECT p.name, j.id, j.kind, j.state, coalesce(r.value, '') FROM truth_job AS j JOIN "
+          "map_place AS p ON p.map = j.map AND p.state = $1 LEFT JOIN truth_job_parameter AS r ON "
+          "r.map = j.map AND r.job = j.id AND r.name = $2 WHERE j.state < 3 ORDER BY j.updated_us",
+          kThere,
+          absl::string_view(kRunBy)));
+  std::vector<UnfinishedJob> jobs;
+  while (row.Next()) {
+    jobs.push_back({row.Text(0),
+                    row.Unsigned(1),
+                    row.Text(2),
+                    static_cast<JobState>(row.Int(3)),
+                    row.Text(4)});
+  }
+  return jobs;
+}
+
+absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenToWork(
+    absl::string_view name, std::uint64_t job, absl::string_view run_by) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  OpenedMap map{.number = number, .name = std::string(name), .beside = 1};
+  map.job = job;
+  map.run_by = std::string(run_by);
+  map.patience = std::max(leases_->time(), absl::Seconds(1));
+  return std::make_unique<PostgresStorage>(pool_, map, leases_, nullptr);
 }
 
 absl::StatusOr<std::vector<std::pair<std::string, MapClock>>> PostgresMaps::ListClocks(
@@ -409,8 +458,18 @@ absl::Status PostgresMaps::Import(absl::string_view name,
   return InTransaction(*lease, [&] { return ImportRows(*lease, database, name, stop); });
 }
 
+absl::Status PostgresMaps::Offer(absl::string_view name) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return leases_->Offer(*lease, number, name);
+}
+
 absl::StatusOr<std::unique_ptr<MapStorage>> PostgresMaps::OpenAlone(absl::string_view name) const {
   STRATA_ASSIGN_OR_RETURN(const std::int64_t number, Find(name));
+  if (!leases_->takes_maps()) {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease connection, pool_->Take());
+    return leases_->Refuse(*connection, number, name);
+  }
   OpenedMap map{.number = number, .name = std::string(name), .fenced = fenced_};
   map.patience = std::max(leases_->time(), absl::Seconds(1));
   STRATA_ASSIGN_OR_RETURN(std::shared_ptr<MapLease> lease, TakeOver(map));
@@ -482,6 +541,33 @@ absl::Status PostgresMaps::Delete(absl::string_view name) const {
     STRATA_RETURN_IF_ERROR(InTransaction(*lease, [&] { return DeleteName(*lease, map, name); }));
   }
   return DeleteRows(map);
+}
+
+absl::Status PostgresMaps::DeleteAsAsked(absl::string_view name) const {
+  STRATA_ASSIGN_OR_RETURN(const std::int64_t map, Find(name));
+  STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+  return InTransaction(*lease, [&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(DeleteName(*lease, map, name));
+    STRATA_ASSIGN_OR_RETURN(
+        const std::uint64_t asked,
+        lease->Change("DELETE FROM map_edit WHERE map = $1 AND kind = $2 AND answer IS NULL",
+                      map,
+                      static_cast<int>(EditKind::kDeleteMap)));
+    if (asked > 0) return absl::OkStatus();
+    return absl::AbortedError(absl::StrCat("the deletion of map ", name, " was withdrawn"));
+  });
+}
+
+absl::Status PostgresMaps::FinishDeletions() const {
+  std::vector<std::int64_t> going;
+  {
+    STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
+    STRATA_ASSIGN_OR_RETURN(Rows rows,
+                            lease->Query("SELECT map FROM map_place WHERE state = $1", kGoing));
+    while (rows.Next()) going.push_back(rows.Int(0));
+  }
+  for (const std::int64_t map : going) STRATA_RETURN_IF_ERROR(DeleteRows(map));
+  return absl::OkStatus();
 }
 
 absl::Status PostgresMaps::DeleteRows(std::int64_t map) const {

@@ -76,7 +76,8 @@ class PostgresMaps {
   absl::StatusOr<std::unique_ptr<MapStorage>> Open(absl::string_view name) const;
   // The same, alone: with a lease, renewed until the storage goes. UNAVAILABLE with MapOwnerOf()
   // while another process has it so. Whoever had it so before, and let its lease end, can not write
-  // any more (TakenAway()), since every commit asks.
+  // any more (TakenAway()), since every commit asks. A process that takes no maps (LeaseOptions) is
+  // always refused so.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenAlone(absl::string_view name) const;
   // The same, while nobody has it alone: else commits are UNAVAILABLE with MapOwnerOf(). Takes no
   // lease, so that the next to have it alone still learns who had it last.
@@ -84,11 +85,23 @@ class PostgresMaps {
   // For scans beside whoever has it alone, whose commits they do not disturb: PutScan() is
   // RESOURCE_EXHAUSTED while `most_waiting` (at least 1) wait for integration, and UNAVAILABLE if
   // chunks of the scan are gone. UNAVAILABLE while nobody has it alone: then whoever would add
-  // takes it. NOT_FOUND.
+  // takes it, unless he takes no maps. NOT_FOUND.
   absl::StatusOr<std::unique_ptr<MapStorage>> OpenToAdd(absl::string_view name,
                                                         std::uint64_t most_waiting) const;
+  // OK where somebody has the map alone, or will soon: it is offered to those who take maps.
+  // UNAVAILABLE where none of them lives. NOT_FOUND.
+  absl::Status Offer(absl::string_view name) const;
   // Those that this process has alone in which scans, jobs or edits wait, whoever added them.
   absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const;
+  // Servers that live now.
+  absl::StatusOr<std::vector<LiveServer>> ListServers() const;
+  // Of all maps, those longest unchanged first.
+  absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const;
+  // For a job that is run beside whoever has the map alone: commits are taken back, TakenAway(),
+  // once the job's parameter kRunBy is another than `run_by`; empty: not so. NOT_FOUND.
+  absl::StatusOr<std::unique_ptr<MapStorage>> OpenToWork(absl::string_view name,
+                                                         std::uint64_t job,
+                                                         absl::string_view run_by) const;
   // Makes a map of a map file that nobody has open, all or nothing: of the current format and
   // closed well (FAILED_PRECONDITION). Its clock begins behind those of all maps that were removed.
   // A row is in memory at a time. ALREADY_EXISTS; DATA_LOSS for a damaged file; INVALID_ARGUMENT
@@ -104,6 +117,11 @@ class PostgresMaps {
   // can neither read nor write it any more. Its rows go after its name, so that
   // what is left when this ends with an error is deleted by the next Connect(). NOT_FOUND.
   absl::Status Delete(absl::string_view name) const;
+  // The same as an edit EditKind::kDeleteMap asks for, which goes with the name: who has asked
+  // carries out the rest. ABORTED where none waits any more.
+  absl::Status DeleteAsAsked(absl::string_view name) const;
+  // Takes the rows of maps that have no name any more, but for those that another is at.
+  absl::Status FinishDeletions() const;
 
  private:
   PostgresMaps(std::shared_ptr<ConnectionPool> pool, const PostgresOptions& options)

@@ -23,6 +23,7 @@
 #include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/map_leases.h"
+#include "core/world/job.h"
 #include "core/world/value_codec.h"
 
 namespace strata {
@@ -134,7 +135,23 @@ absl::Status PostgresWriter::LockOthersMap(bool relaxed) {
       relaxed ? connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR KEY SHARE", map_)
               : connection_->Query("SELECT owner FROM truth_map WHERE map = $1 FOR NO KEY UPDATE",
                                    map_);
-  return CheckOwner(owner, opened_);
+  STRATA_RETURN_IF_ERROR(CheckOwner(owner, opened_));
+  return opened_.run_by.empty() ? absl::OkStatus() : CheckRunsJob();
+}
+
+absl::Status PostgresWriter::CheckRunsJob() {
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      connection_->Query(
+          "SELECT 1 FROM truth_job_parameter WHERE map = $1 AND job = $2 AND name = $3 "
+          "AND value = $4",
+          map_,
+          opened_.job,
+          absl::string_view(kRunBy),
+          opened_.run_by));
+  if (row.Next()) return absl::OkStatus();
+  return TakenAway(absl::StrCat(
+      "map ", opened_.name, ": job ", opened_.job, " is not run by this server any more"));
 }
 
 absl::Status PostgresWriter::LockOwnMap(std::int64_t commit) {

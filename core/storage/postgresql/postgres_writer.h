@@ -33,6 +33,9 @@ struct OpenedMap {
   bool idle = false;             // commits are refused while somebody has it alone
   // Scans are added beside whoever has it alone, while less than so many wait; 0: not so.
   std::uint64_t beside = 0;
+  // Commits are of this job, as long as its parameter kRunBy is `run_by`; empty: of none.
+  std::uint64_t job = 0;
+  std::string run_by = {};
   LastOwner last_owner = LastOwner::kSelf;
   // How long its owner may do nothing within a commit; then the database ends it.
   absl::Duration patience = absl::Seconds(20);
@@ -152,6 +155,8 @@ class PostgresWriter final : public StorageWriter {
   // Of a map that somebody else has alone: it is there; in a full commit nobody else writes it
   // until the end. Leaves no number, which its owner would not know.
   absl::Status LockOthersMap(bool relaxed);
+  // That the job of these commits has not been given to another.
+  absl::Status CheckRunsJob();
   // What lets a scan in beside the map's owner.
   absl::Status CheckAdded(const ScanRecord& scan);
   // Keeps that all after `commit_sequence` is told, and nothing before it.

@@ -37,6 +37,11 @@ absl::Status AddMaps(Connection& connection, StoreCheck& check) {
       connection.Query("SELECT server, count(*) FROM map_lease WHERE expires > clock_timestamp() "
                        "GROUP BY server"));
   while (row.Next()) check.open[std::string(row.Text(0))] = row.Unsigned(1);
+  if (check.format < 5) return absl::OkStatus();
+  STRATA_ASSIGN_OR_RETURN(
+      Rows servers,
+      connection.Query("SELECT server, roles FROM map_server WHERE expires > clock_timestamp()"));
+  while (servers.Next()) check.servers[servers.Text(0)] = servers.Text(1);
   return absl::OkStatus();
 }
 

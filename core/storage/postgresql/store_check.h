@@ -15,7 +15,8 @@ namespace strata {
 struct StoreCheck {
   std::int64_t format = 0;  // of the tables; 0: there are none yet
   std::uint64_t maps = 0;
-  std::map<std::string, std::uint64_t> open;  // maps by the server that has them open now
+  std::map<std::string, std::uint64_t> open;   // maps by the server that has them open now
+  std::map<std::string, std::string> servers;  // roles by the name of the server that lives
   std::vector<std::string> faults;  // settings with which the database loses what was acknowledged
 };
 

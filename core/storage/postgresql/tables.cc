@@ -359,6 +359,18 @@ CREATE TABLE map_edit (
 );
 )sql";
 
+// Since version 5: servers that live, and what they do (a holder is that of map_lease); and how
+// jobs are found that wait for them.
+constexpr char kServers[] = R"sql(
+CREATE TABLE map_server (
+  holder text PRIMARY KEY,
+  server text NOT NULL,
+  roles text NOT NULL,
+  expires timestamptz NOT NULL
+) WITH (fillfactor = 50);
+CREATE INDEX truth_job_unfinished ON truth_job (map, id) WHERE state < 3;
+)sql";
+
 constexpr std::array<const char*, 13> kDerived = {
     "DELETE FROM derived_mls_tile WHERE map = $1",
     "DELETE FROM derived_surface_tile WHERE map = $1",
@@ -426,6 +438,10 @@ absl::Status MakeInTransaction(Connection& connection) {
   if (version < 4) {
     STRATA_RETURN_IF_ERROR(connection.Execute(kEdits));
     STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 4"));
+  }
+  if (version < 5) {
+    STRATA_RETURN_IF_ERROR(connection.Execute(kServers));
+    STRATA_RETURN_IF_ERROR(connection.Execute("UPDATE strata_format SET version = 5"));
   }
   return connection.Execute("COMMIT");
 }

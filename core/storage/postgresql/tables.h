@@ -13,7 +13,7 @@
 namespace strata {
 
 // Newest format of the tables this program reads and writes.
-inline constexpr std::int64_t kDatabaseVersion = 4;
+inline constexpr std::int64_t kDatabaseVersion = 5;
 
 // Makes the tables where there are none, or adds what those of earlier versions lack; safe when
 // others do so at the same time. FAILED_PRECONDITION for a newer format.

@@ -96,6 +96,7 @@ void CampaignWorld::LaunchServer(std::size_t i) {
     add("--store", options_.store);
     add("--server-name", NameOf(i));
   }
+  if (!options_.roles.empty()) add("--role", options_.roles[i % options_.roles.size()]);
   if (options_.lease > absl::ZeroDuration()) {
     add("--map-lease", absl::StrCat(absl::ToDoubleSeconds(options_.lease)));
   }

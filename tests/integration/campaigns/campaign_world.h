@@ -31,10 +31,11 @@ struct CampaignOptions {
   int period_ms = 500;           // of a robot, between scans
   int columns = 640;             // of CampaignCloud
   bool align = false;
-  std::string store;           // the address of a database; empty: maps are files
-  int servers = 1;             // more than one: of `store`
-  absl::Duration lease = {};   // of a map; zero: as the program has it
-  std::string server_program;  // another one than stratad
+  std::string store;               // the address of a database; empty: maps are files
+  int servers = 1;                 // more than one: of `store`
+  std::vector<std::string> roles;  // --role of the servers, by turns; empty: as the program has it
+  absl::Duration lease = {};       // of a map; zero: as the program has it
+  std::string server_program;      // another one than stratad
 };
 
 struct CampaignReport {

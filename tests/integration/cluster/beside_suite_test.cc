@@ -1,5 +1,5 @@
-// The conformance suite by a server that has not got the maps, which another one on the same
-// database has: nothing but to make and to delete them is asked of that one.
+// The conformance suite by a server that takes no maps (a gateway), beside one on the same database
+// that does, which nobody asks for anything.
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -29,11 +29,12 @@ struct Served {
   Served(const std::filesystem::path& directory,
          const std::string& store,
          const std::string& name,
-         const std::string& listen) {
+         bool integrates) {
     EngineOptions engine_options;
     engine_options.directory = directory;
     engine_options.store = store;
     engine_options.server_name = name;
+    engine_options.integrates = integrates;
     // Every upload waits for the owner's next look at what came in beside it.
     engine_options.look_interval = absl::Milliseconds(20);
     auto opened = OpenEngine(engine_options);
@@ -41,7 +42,7 @@ struct Served {
     if (!opened.ok()) return;
     engine = *std::move(opened);
     server::ServerOptions server_options;
-    server_options.listen = listen;
+    server_options.listen = "127.0.0.1:0";
     auto started = server::Server::Start(*engine, server_options);
     EXPECT_THAT(started, IsOk());
     if (started.ok()) server = *std::move(started);
@@ -51,63 +52,6 @@ struct Served {
   std::unique_ptr<server::Server> server;
 };
 
-// Makes and deletes maps at the owner's; all else is the client's.
-class MapsOfTheOwner final : public api::Maps {
- public:
-  MapsOfTheOwner(api::Maps& owner, api::Maps& client) : owner_(owner), client_(client) {}
-
-  absl::StatusOr<MapInfo> Create(const api::Call& call,
-                                 absl::string_view name,
-                                 const MapParameters& parameters) override {
-    return owner_.Create(call, name, parameters);
-  }
-  absl::StatusOr<MapInfo> Get(const api::Call& call, absl::string_view name) override {
-    return client_.Get(call, name);
-  }
-  absl::StatusOr<std::vector<MapInfo>> List(const api::Call& call) override {
-    return client_.List(call);
-  }
-  absl::Status Delete(const api::Call& call, absl::string_view name) override {
-    return owner_.Delete(call, name);
-  }
-  absl::StatusOr<MapStats> Stats(const api::Call& call, absl::string_view name) override {
-    return client_.Stats(call, name);
-  }
-  absl::StatusOr<std::vector<EpochInfo>> History(const api::Call& call,
-                                                 absl::string_view name) override {
-    return client_.History(call, name);
-  }
-  absl::StatusOr<std::vector<MapClass>> ListClasses(const api::Call& call,
-                                                    absl::string_view name) override {
-    return client_.ListClasses(call, name);
-  }
-  absl::Status SetClass(const api::Call& call,
-                        absl::string_view name,
-                        const MapClass& map_class) override {
-    return client_.SetClass(call, name, map_class);
-  }
-  absl::Status SetOrigin(const api::Call& call,
-                         absl::string_view name,
-                         const GeodeticOrigin& origin) override {
-    return client_.SetOrigin(call, name, origin);
-  }
-  absl::Status Watch(const api::Call& call,
-                     absl::string_view name,
-                     const api::WatchOptions& options,
-                     absl::FunctionRef<absl::Status(const api::MapUpdate&)> sink) override {
-    return client_.Watch(call, name, options, sink);
-  }
-  absl::Status Backup(const api::Call& call,
-                      absl::string_view name,
-                      absl::FunctionRef<absl::Status(const api::BackupPiece&)> sink) override {
-    return client_.Backup(call, name, sink);
-  }
-
- private:
-  api::Maps& owner_;
-  api::Maps& client_;
-};
-
 class DatabaseBesideItsOwner final : public api::Database {
  public:
   explicit DatabaseBesideItsOwner(const std::filesystem::path& directory) {
@@ -115,22 +59,16 @@ class DatabaseBesideItsOwner final : public api::Database {
     EXPECT_THAT(cluster, IsOk());
     const std::string store = (*cluster)->AddressOfOwn(directory.string());
     // Whose name is no address: its client is sent nowhere.
-    owner_.emplace(directory / "owner", store, "owner", "127.0.0.1:0");
-    const auto maps = owner_->engine->maps().List({});
-    EXPECT_THAT(maps, IsOk());
-    for (const MapInfo& map : *maps) {
-      EXPECT_THAT(owner_->engine->jobs().List({}, map.name), IsOk());  // which opens it
-    }
-    other_.emplace(directory / "other", store, "", "127.0.0.1:0");
+    owner_.emplace(directory / "owner", store, "owner", /*integrates=*/true);
+    other_.emplace(directory / "other", store, "", /*integrates=*/false);
     ClientOptions options;
     options.target = other_->server->address();
     auto client = Connect(options);
     EXPECT_THAT(client, IsOk());
     client_ = *std::move(client);
-    maps_ = std::make_unique<MapsOfTheOwner>(owner_->engine->maps(), client_->maps());
   }
 
-  api::Maps& maps() override { return *maps_; }
+  api::Maps& maps() override { return client_->maps(); }
   api::Scans& scans() override { return client_->scans(); }
   api::Tiles& tiles() override { return client_->tiles(); }
   api::Planning& planning() override { return client_->planning(); }
@@ -145,7 +83,6 @@ class DatabaseBesideItsOwner final : public api::Database {
   std::optional<Served> owner_;
   std::optional<Served> other_;
   std::unique_ptr<api::Database> client_;
-  std::unique_ptr<api::Maps> maps_;
 };
 
 // Where there is no PostgreSQL 15 to run.

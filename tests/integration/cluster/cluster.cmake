@@ -9,8 +9,8 @@ add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
 set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
-# The conformance suite by the server that has not got the maps. Uploads that begin there do not go on where they broke, and
-# tiles of earlier epochs are the owner's.
+# The conformance suite by a gateway. Uploads that begin there do not go on where they broke, and tiles of earlier epochs are
+# the owner's.
 strata_executable(
   beside_suite_test beside_suite_test
   SOURCES cluster/beside_suite_test.cc
@@ -44,6 +44,17 @@ strata_executable(
 add_dependencies(edits_elsewhere_test stratad)
 add_test(NAME edits_elsewhere_test COMMAND edits_elsewhere_test)
 set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+
+# Servers that take maps and servers that do not; and maps that are deleted by those that have not got them.
+strata_executable(
+  roles_test roles_test
+  SOURCES stratad_process.cc cluster/roles_test.cc
+  DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
+  SHARED_HEADERS strata_test_headers
+)
+add_dependencies(roles_test stratad)
+add_test(NAME roles_test COMMAND roles_test)
+set_tests_properties(roles_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
 
 # Watches by the server that has not got the map.
 strata_executable(

@@ -51,5 +51,13 @@ TEST_F(ClusterCampaignTest, WorkThatIsUnderWayOutlivesItsServer) {
   Run();
 }
 
+TEST_F(ClusterCampaignTest, ServersOfAllRolesAreLostOneAfterTheOther) {
+  options_.faults = 3;
+  options_.work = true;
+  options_.world.servers = 4;
+  options_.world.roles = {"gateway", "integrator", "integrator,worker", "worker"};
+  Run();
+}
+
 }  // namespace
 }  // namespace strata::testing

@@ -36,8 +36,9 @@ inline constexpr absl::Duration kPatience = absl::Seconds(30);
 
 class SharingServer {
  public:
-  SharingServer(std::string name, std::string store)
-      : name_(std::move(name)), store_(std::move(store)) {}
+  // `more`: arguments.
+  SharingServer(std::string name, std::string store, std::vector<std::string> more = {})
+      : name_(std::move(name)), store_(std::move(store)), more_(std::move(more)) {}
 
   // From its next start on its name is its address.
   void NameByAddress() {
@@ -45,18 +46,20 @@ class SharingServer {
     name_ = listen_;
   }
   void Start() {
-    process_ = std::make_unique<StratadProcess>(std::vector<std::string>{"--data",
-                                                                         data_.path().string(),
-                                                                         "--listen",
-                                                                         listen_,
-                                                                         "--store",
-                                                                         store_,
-                                                                         "--map-lease",
-                                                                         "1",
-                                                                         "--server-name",
-                                                                         name_,
-                                                                         "--optimize-every",
-                                                                         "0"});
+    std::vector<std::string> arguments = {"--data",
+                                          data_.path().string(),
+                                          "--listen",
+                                          listen_,
+                                          "--store",
+                                          store_,
+                                          "--map-lease",
+                                          "1",
+                                          "--server-name",
+                                          name_,
+                                          "--optimize-every",
+                                          "0"};
+    arguments.insert(arguments.end(), more_.begin(), more_.end());
+    process_ = std::make_unique<StratadProcess>(arguments);
     ClientOptions options;
     options.target = process_->Address();
     options.backoff.max_attempts = 1;  // whoever asks goes to another server
@@ -81,6 +84,7 @@ class SharingServer {
   std::string name_;
   std::string listen_ = "127.0.0.1:0";
   const std::string store_;
+  const std::vector<std::string> more_;
   const TempDir data_;
   std::unique_ptr<StratadProcess> process_;
   absl::Mutex mutex_;

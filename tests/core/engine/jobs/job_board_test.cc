@@ -20,6 +20,7 @@
 #include "core/common/cache_budget.h"
 #include "core/common/status.h"
 #include "core/engine/jobs/job_beside.h"
+#include "core/engine/jobs/job_changes.h"
 #include "core/engine/map/map_core.h"
 #include "core/engine/map/quarantine.h"
 #include "core/storage/sqlite/sqlite_storage.h"
@@ -280,6 +281,79 @@ TEST_F(JobBoardTest, ACancelBesideMeansNoLaterRun) {
     return context.Progress(0.5, "half");
   }));
   EXPECT_EQ(board_->Get(job.id)->state, JobState::kSucceeded);
+}
+
+// One job of a map at a time, whoever runs it; the board shows it, and tells it to end.
+TEST_F(JobBoardTest, AJobThatAnotherEngineRunsIsShownAndLeftToIt) {
+  const std::unique_ptr<MapStorage> beside = Beside();
+  StorageWriter& writer = beside->writer();
+  const auto change = [&](std::uint64_t id, absl::FunctionRef<void(JobInfo&)> how) {
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&] {
+      return ChangeStoredJob(writer,
+                             id,
+                             [&](JobInfo& job, StorageWriter&) {
+                               how(job);
+                               return absl::OkStatus();
+                             })
+          .status();
+    }));
+    STRATA_ASSERT_OK(board_->TakeIn());
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo first, Start("a"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo second, Start("a"));
+  change(first.id, [](JobInfo& job) {
+    job.state = JobState::kRunning;
+    job.parameters[kRunBy] = "worker/1";
+  });
+  EXPECT_EQ(board_->Get(first.id)->state, JobState::kRunning);
+  EXPECT_FALSE(board_->NextId().has_value());
+  STRATA_EXPECT_OK(RunOne());
+  EXPECT_EQ(board_->Get(second.id)->state, JobState::kQueued);
+  change(first.id, [](JobInfo& job) { job.progress = 0.5; });
+  EXPECT_EQ(board_->Get(first.id)->progress, 0.5);
+  // As the map's next owner.
+  Close();
+  Open();
+  EXPECT_EQ(board_->Get(first.id)->state, JobState::kRunning);
+  EXPECT_TRUE(board_->AnyElsewhere());
+  STRATA_EXPECT_OK(board_->ReturnDead({"worker"}));
+  EXPECT_EQ(board_->Get(first.id)->state, JobState::kRunning);
+  STRATA_EXPECT_OK(board_->Cancel(first.id).status());
+  EXPECT_EQ(board_->Get(first.id)->state, JobState::kRunning);
+  EXPECT_TRUE(IsToldToEnd(*board_->Get(first.id)));
+  change(first.id, [](JobInfo& job) { EndJob(job, absl::CancelledError("told"), {}); });
+  EXPECT_EQ(board_->Get(first.id)->state, JobState::kCancelled);
+  EXPECT_TRUE(board_->Get(first.id)->parameters.empty());
+  EXPECT_EQ(board_->NextId(), second.id);
+  STRATA_EXPECT_OK(RunOne());
+  EXPECT_EQ(board_->Get(second.id)->state, JobState::kSucceeded);
+}
+
+TEST_F(JobBoardTest, AJobWhoseEngineIsGoneWaitsAgainUntilItWasTooOften) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, Start("a"));
+  const std::unique_ptr<MapStorage> beside = Beside();
+  StorageWriter& writer = beside->writer();
+  for (std::uint32_t death = 1; death <= kMostDeathsOfMany; ++death) {
+    EXPECT_EQ(board_->NextId(), job.id) << death;
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&] {
+      return ChangeStoredJob(writer,
+                             job.id,
+                             [](JobInfo& now, StorageWriter&) {
+                               now.state = JobState::kRunning;
+                               now.parameters[kRunBy] = "worker/1";
+                               return absl::OkStatus();
+                             })
+          .status();
+    }));
+    STRATA_ASSERT_OK(board_->TakeIn());
+    STRATA_ASSERT_OK(board_->ReturnDead({"another"}));
+    EXPECT_FALSE(board_->AnyElsewhere());
+  }
+  EXPECT_FALSE(board_->NextId().has_value());
+  EXPECT_TRUE(IsQuarantined(*board_->Get(job.id))) << board_->Get(job.id)->message;
+  STRATA_EXPECT_OK(writer.Commit(Durability::kFull, [&] {
+    return Release(writer, {WorkKind::kJob, job.id});
+  }));
 }
 
 TEST_F(JobBoardTest, WaitingJobsAreBoundedOfOneAndOfAll) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
@@ -63,10 +64,14 @@ class MapLeasesTest : public ::testing::Test {
         "BEGIN PERFORM nextval('renewals'); RETURN NEW; END $f$; CREATE TRIGGER renewal BEFORE "
         "UPDATE ON map_lease FOR EACH ROW EXECUTE FUNCTION count_renewal()"));
   }
-  PostgresMaps Server(const std::string& name, absl::Duration time = kLong, bool fenced = true) {
+  PostgresMaps Server(const std::string& name,
+                      absl::Duration time = kLong,
+                      bool fenced = true,
+                      const std::string& roles = "") {
     PostgresOptions options;
     options.where = address_;
-    options.lease = {.holder = name, .server = absl::StrCat("server ", name), .time = time};
+    options.lease = {
+        .holder = name, .server = absl::StrCat("server ", name), .roles = roles, .time = time};
     options.fenced = fenced;
     auto maps = PostgresMaps::Connect(options);
     STRATA_EXPECT_OK(maps);
@@ -115,6 +120,125 @@ TEST_F(MapLeasesTest, OneHasItAtATime) {
   // Whoever goes gives it up at once.
   held.reset();
   EXPECT_TRUE(Within30s([&] { return b.OpenAlone(kName).ok(); }));
+}
+
+TEST_F(MapLeasesTest, WhoTakesNoMapsIsAlwaysRefused) {
+  const PostgresMaps gateway = Server("g", kLong, true, "gateway");
+  const absl::Status refused = gateway.OpenAlone(kName).status();
+  EXPECT_EQ(MapOwnerOf(refused), "nobody") << refused;
+  EXPECT_TRUE(absl::IsNotFound(gateway.OpenAlone("nowhere").status()));
+  const PostgresMaps a = Server("a");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  EXPECT_EQ(MapOwnerOf(gateway.OpenAlone(kName).status()), "server a");
+}
+
+// To those that take maps, as one whose server died, and only where some of them lives.
+TEST_F(MapLeasesTest, AMapThatNobodyHasIsOffered) {
+  const PostgresMaps gateway = Server("g", kLong, true, "gateway");
+  EXPECT_THAT(gateway.Offer(kName),
+              StatusIs(absl::StatusCode::kUnavailable, ::testing::HasSubstr("--role integrator")));
+  EXPECT_TRUE(absl::IsNotFound(gateway.Offer("nowhere")));
+  const PostgresMaps a = Server("a", kLong, true, "gateway,integrator");
+  STRATA_EXPECT_OK(gateway.Offer(kName));
+  EXPECT_THAT(a.ListAbandoned(), IsOkAndHolds(ElementsAre(kName)));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
+  EXPECT_EQ(held->last_owner(), LastOwner::kNobody);
+  STRATA_EXPECT_OK(gateway.Offer(kName));
+  EXPECT_THAT(a.ListAbandoned(), IsOkAndHolds(IsEmpty()));
+  STRATA_EXPECT_OK(Tick(*held));
+}
+
+TEST_F(MapLeasesTest, ServersLiveAsLongAsTheySaySo) {
+  const PostgresMaps any = Server("any");
+  const auto works = [&any] {
+    std::vector<std::pair<std::string, bool>> found;
+    const auto servers = any.ListServers();
+    STRATA_EXPECT_OK(servers);
+    for (const LiveServer& server : *servers) found.emplace_back(server.holder, server.works);
+    return found;
+  };
+  EXPECT_THAT(works(), IsEmpty()) << "who has no roles is no server";
+  {
+    const PostgresMaps gateway = Server("g", kShort, true, "gateway");
+    {
+      const PostgresMaps worker = Server("w", kLong, true, "gateway,worker");
+      EXPECT_THAT(works(),
+                  ::testing::UnorderedElementsAre(std::pair("g", false), std::pair("w", true)));
+    }
+    EXPECT_THAT(works(), ElementsAre(std::pair("g", false))) << "who ends says so";
+    absl::SleepFor(2 * kShort);
+    EXPECT_THAT(works(), ElementsAre(std::pair("g", false))) << "it is renewed";
+  }
+  EXPECT_THAT(works(), IsEmpty());
+}
+
+// Beside who has the map, until the job is given to another.
+TEST_F(MapLeasesTest, CommitsOfAJobAskWhoRunsIt) {
+  const PostgresMaps owner = Server("a");
+  const PostgresMaps worker = Server("w", kLong, true, "worker");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto held, owner.OpenAlone(kName));
+  JobInfo job;
+  job.id = 3;
+  job.kind = "verify";
+  job.state = JobState::kRunning;
+  const auto put = [&](MapStorage& map, const std::string& run_by) {
+    job.parameters[kRunBy] = run_by;
+    return map.writer().Commit(Durability::kFull, [&] { return map.writer().PutJob(job); });
+  };
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto taking, worker.OpenToWork(kName, 3, ""));
+  STRATA_ASSERT_OK(put(*taking, "w/1"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<UnfinishedJob> jobs, worker.ListUnfinishedJobs());
+  ASSERT_EQ(jobs.size(), 1U);
+  EXPECT_EQ(jobs[0].map, kName);
+  EXPECT_EQ(jobs[0].id, 3U);
+  EXPECT_EQ(jobs[0].state, JobState::kRunning);
+  EXPECT_EQ(jobs[0].run_by, "w/1");
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto running, worker.OpenToWork(kName, 3, "w/1"));
+  STRATA_EXPECT_OK(Stage(*running, 7));
+  STRATA_EXPECT_OK(put(*running, "w/1"));
+  STRATA_EXPECT_OK(Tick(*held));  // neither is in the other's way
+  STRATA_ASSERT_OK(put(*held, "x/2"));
+  for (const absl::Status& done : {Stage(*running, 8), put(*running, "w/1")}) {
+    EXPECT_TRUE(MustBeOpenedAnew(done)) << done;
+  }
+  EXPECT_EQ(worker.ListUnfinishedJobs()->front().run_by, "x/2");
+  job.state = JobState::kSucceeded;
+  STRATA_ASSERT_OK(put(*held, "x/2"));
+  EXPECT_THAT(worker.ListUnfinishedJobs(), IsOkAndHolds(IsEmpty()));
+}
+
+TEST_F(MapLeasesTest, AMapIsDeletedAsAskedUntilThatIsWithdrawn) {
+  const PostgresMaps owner = Server("a");
+  const PostgresMaps asker = Server("b");
+  STRATA_ASSERT_OK_AND_ASSIGN(auto held, owner.OpenAlone(kName));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto beside, asker.OpenToAdd(kName, 10));
+  StorageWriter& writer = beside->writer();
+  std::uint64_t asked = 0;
+  const auto ask = [&] {
+    return writer.Commit(Durability::kFull, [&]() -> absl::Status {
+      EditRequest edit;
+      edit.kind = EditKind::kDeleteMap;
+      STRATA_ASSIGN_OR_RETURN(asked, writer.PutEdit(edit));
+      return absl::OkStatus();
+    });
+  };
+  STRATA_ASSERT_OK(ask());
+  EXPECT_EQ(held->writer().reader().LastEdit().value_or(9), 0U) << "no work of its worker's";
+  ASSERT_EQ(owner.ListWaiting()->size(), 1U);
+  EXPECT_TRUE(owner.ListWaiting()->front().deletion);
+  STRATA_ASSERT_OK(
+      writer.Commit(Durability::kFull, [&] { return writer.WithdrawEdit(asked).status(); }));
+  EXPECT_TRUE(absl::IsAborted(owner.DeleteAsAsked(kName)));
+  STRATA_EXPECT_OK(asker.Has(kName));
+  STRATA_ASSERT_OK(ask());
+  EXPECT_EQ(MapOwnerOf(asker.DeleteAsAsked(kName)), "server a");
+  STRATA_ASSERT_OK(owner.DeleteAsAsked(kName));
+  EXPECT_THAT(asker.Has(kName), IsOkAndHolds(false));
+  EXPECT_TRUE(MustBeOpenedAnew(beside->CheckInPlace()));
+  STRATA_EXPECT_OK(asker.FinishDeletions());
+  STRATA_ASSERT_OK_AND_ASSIGN(Rows left, sql_->Query("SELECT count(*) FROM map_place"));
+  ASSERT_TRUE(left.Next());
+  EXPECT_EQ(left.Int(0), 0);
 }
 
 // Of the same server, started again before its lease has ended.
@@ -184,8 +308,8 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
 
 TEST_F(MapLeasesTest, TablesOfTheVersionBeforeGetLeases) {
   STRATA_ASSERT_OK(
-      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; DROP TABLE map_edit; ALTER TABLE "
-                    "derived_state DROP "
+      sql_->Execute("DROP TABLE map_lease; DROP TABLE map_change; DROP TABLE map_edit; DROP TABLE "
+                    "map_server; DROP INDEX truth_job_unfinished; ALTER TABLE derived_state DROP "
                     "COLUMN changes_after; UPDATE strata_format SET version = 1"));
   const PostgresMaps a = Server("a");
   STRATA_ASSERT_OK_AND_ASSIGN(const auto held, a.OpenAlone(kName));
