@@ -103,7 +103,8 @@ class Optimizer {
     context_.SetMetric("steps_sliding", static_cast<double>(verdict.sliding_steps.size()));
     context_.SetMetric("parts_apart", static_cast<double>(verdict.apart.size()));
     context_.SetMetric("pairs_compared", static_cast<double>(verdict.compared));
-    context_.SetMetric("pairs_contradicted", static_cast<double>(verdict.contradicted));
+    context_.SetMetric("pairs_contradicted",
+                       static_cast<double>(verdict.contradicted_pairs.size()));
     return Proposed{
         world.epoch(), absl::StrCat(Report(world, result), " ", verdict.message), verdict.is_sound};
   }

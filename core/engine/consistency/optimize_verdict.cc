@@ -32,6 +32,8 @@ constexpr std::size_t kLeastLookedAt = 6;
 // Of the pairs of two robots, or of one: a small part of a large map may be wrong as a whole.
 constexpr double kMostOfTwo = 0.5;
 constexpr std::size_t kFewOfTwo = 2;
+// From this share of pairs on a person should look at them.
+constexpr double kWorthALook = 0.1;
 // People and cars pass; a wall that another scan looked through does not.
 constexpr double kMuchContradiction = 0.1;
 // Scans of other passes as near as this see the same.
@@ -122,12 +124,13 @@ absl::Status Compare(const GraphWorld& world,
     Counts& counts = of_two[std::minmax(world.PlaceOf(pair.first).trajectory,
                                         world.PlaceOf(pair.second).trajectory)];
     ++counts.compared;
-    counts.contradicted += *contradiction > kMuchContradiction ? 1 : 0;
+    if (*contradiction <= kMuchContradiction) continue;
+    ++counts.contradicted;
+    verdict.contradicted_pairs.push_back(pair);
   }
   const auto name = [&](std::size_t t) { return world.id(world.Trajectories()[t][0]).trajectory; };
   for (const auto& [two, counts] : of_two) {
     verdict.compared += counts.compared;
-    verdict.contradicted += counts.contradicted;
     if (!IsTooMany(counts.contradicted, counts.compared, kMostOfTwo, kFewOfTwo)) continue;
     verdict.at_odds.push_back(two.first == two.second
                                   ? name(two.first)
@@ -178,14 +181,17 @@ bool PriorsContradict(const OptimizeVerdict& verdict) {
   return IsTooMany(verdict.priors_rejected, verdict.priors, kMostFalse);
 }
 
-// "robot/7, robot/8, …": the scans that steps lead to.
+// "robot/7, robot/8, …": the second scan of each pair, or both, "robot/6 and robot/7, …".
 std::string NamesOf(const GraphWorld& world,
-                    const std::vector<std::pair<std::size_t, std::size_t>>& steps) {
+                    const std::vector<NodePair>& pairs,
+                    bool both = false) {
   std::string names;
-  for (std::size_t k = 0; k < std::min(kNamed, steps.size()); ++k) {
-    absl::StrAppend(&names, k == 0 ? "" : ", ", world.id(steps[k].second).ToString());
+  for (std::size_t k = 0; k < std::min(kNamed, pairs.size()); ++k) {
+    absl::StrAppend(&names, k == 0 ? "" : ", ");
+    if (both) absl::StrAppend(&names, world.id(pairs[k].first).ToString(), " and ");
+    absl::StrAppend(&names, world.id(pairs[k].second).ToString());
   }
-  return absl::StrCat(names, steps.size() > kNamed ? ", …" : "");
+  return absl::StrCat(names, pairs.size() > kNamed ? ", …" : "");
 }
 
 std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
@@ -206,12 +212,23 @@ std::string StepsMessage(const GraphWorld& world, const OptimizeVerdict& verdict
       NamesOf(world, sliding));
 }
 
-std::string PairsMessage(const OptimizeVerdict& verdict) {
-  if (verdict.contradicted == 0) return "";
+// Whether so many pairs are contradicted that it is more than what moves, or is of glass.
+bool ArePairsDoubtful(const OptimizeVerdict& verdict) {
+  return !verdict.contradicted_pairs.empty() &&
+         static_cast<double>(verdict.contradicted_pairs.size()) >=
+             kWorthALook * static_cast<double>(verdict.compared);
+}
+
+std::string PairsMessage(const GraphWorld& world, const OptimizeVerdict& verdict) {
+  const std::vector<NodePair>& pairs = verdict.contradicted_pairs;
+  if (pairs.empty()) return "";
   std::string message =
       absl::StrFormat("; in %d of %d pairs one scan looks through what the other saw",
-                      verdict.contradicted,
+                      pairs.size(),
                       verdict.compared);
+  if (verdict.at_odds.empty() && ArePairsDoubtful(verdict)) {
+    absl::StrAppend(&message, " (", NamesOf(world, pairs, true), ")");
+  }
   for (std::size_t k = 0; k < std::min(kNamed, verdict.at_odds.size()); ++k) {
     absl::StrAppend(&message, k == 0 ? ", most of " : "; of ", verdict.at_odds[k]);
   }
@@ -240,7 +257,7 @@ std::string PriorsMessage(const OptimizeVerdict& verdict) {
                          verdict.priors);
 }
 
-absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination termination) {
+std::string Meaning(const OptimizeVerdict& verdict, AlignmentTermination termination) {
   if (PriorsContradict(verdict)) {
     return "Scans and absolute poses (GPS, landmarks) contradict each other: look at the proposal; "
            "job accept applies what the scans say, posegraph disable takes out what is wrong.";
@@ -251,9 +268,12 @@ absl::string_view Meaning(const OptimizeVerdict& verdict, AlignmentTermination t
            "or one map for each place would help; job accept applies it.";
   }
   if (!verdict.loose_steps.empty()) return "Usable; look at these steps.";
+  if (ArePairsDoubtful(verdict)) return "Usable; look at these pairs.";
   if (termination != AlignmentTermination::kSettled) return "Usable; run it again for the rest.";
-  if (!verdict.sliding_steps.empty()) return "Good but for what may slide.";
-  return verdict.apart.empty() ? "Good." : "Good within each part.";
+  return absl::StrCat("Good",
+                      verdict.apart.empty() ? "" : " within each part",
+                      verdict.sliding_steps.empty() ? "" : " but for what may slide",
+                      ".");
 }
 
 }  // namespace
@@ -270,11 +290,11 @@ absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
   STRATA_RETURN_IF_ERROR(Compare(world, views, result, verdict));
   verdict.priors = result.priors;
   verdict.priors_rejected = result.rejected_priors;
-  verdict.is_sound = !PriorsContradict(verdict) &&
-                     !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
-                     !IsTooMany(verdict.contradicted, verdict.compared) && verdict.at_odds.empty();
+  verdict.is_sound =
+      !PriorsContradict(verdict) && !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
+      !IsTooMany(verdict.contradicted_pairs.size(), verdict.compared) && verdict.at_odds.empty();
   verdict.message = absl::StrCat(StepsMessage(world, verdict),
-                                 PairsMessage(verdict),
+                                 PairsMessage(world, verdict),
                                  PriorsMessage(verdict),
                                  ". ",
                                  PartsMessage(world, verdict),

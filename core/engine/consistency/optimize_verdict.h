@@ -31,7 +31,7 @@ struct OptimizeVerdict {
   // Pairs of scans near each other that something joins, along trajectories and across, spread over
   // the map; and those of them where one looked through much of what the other saw.
   std::size_t compared = 0;
-  std::size_t contradicted = 0;
+  std::vector<std::pair<std::size_t, std::size_t>> contradicted_pairs;
   std::vector<std::string> at_odds;  // robots that most pairs of theirs speak against
   // Parts of the map that nothing joins to the largest, and no loose steps either: the first node
   // and how many there are.

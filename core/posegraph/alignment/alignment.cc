@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -11,10 +12,12 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/posegraph/alignment/alignment_problem.h"
 #include "core/posegraph/alignment/odometry_noise.h"
 #include "core/posegraph/alignment/parts.h"
 #include "core/posegraph/alignment/scan_chains.h"
 #include "core/posegraph/alignment/shared_surfaces.h"
+#include "core/posegraph/alignment/step_check.h"
 #include "core/posegraph/information.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
 #include "core/registration/registration_target.h"
@@ -30,6 +33,11 @@ struct Match {
   // T_i_scan as measured, i being scans of the chain, nearest first.
   std::vector<std::pair<std::size_t, Pose>> T_i_scan;
   Matrix6d information = Matrix6d::Zero();  // of the match, to be shared by all of them
+  // One that may be false, or of a lost scan, and leaves a direction to odometry.
+  bool joins_nothing = false;
+
+  // Of each of T_i_scan.
+  Matrix6d Share() const { return information / static_cast<double>(T_i_scan.size()); }
 };
 
 // Within these of what was measured a match has the same correspondences.
@@ -42,6 +50,9 @@ constexpr double kMeasuredPlaceRad = 0.02;
 constexpr double kMinDoubtfulOverlap = 0.5;
 // A match is recorded as relative poses to the nearest few.
 constexpr std::size_t kMaxPartners = 3;
+// Scans that a doubtful step is checked by, on both sides of it.
+constexpr std::size_t kCheckedBefore = 5;
+constexpr std::size_t kCheckedAfter = 3;
 
 bool Acceptable(Termination termination) {
   return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
@@ -69,50 +80,52 @@ class Alignment {
             const AlignmentOptions& options,
             ForEach for_each,
             const Stop& stop)
-      : problem_(problem),
+      : ways_(problem.trajectories),
+        problem_(problem),
         source_(source),
         options_(options),
         for_each_(for_each),
         stop_(stop),
-        chains_(problem, options.neighbours),
+        chains_(problem_, options.neighbours),
         matches_(problem.T_map_scan.size()),
-        measured_(problem.T_map_scan.size()),
         odometry_(problem.T_map_scan.size(), nullptr),
         lost_(problem.T_map_scan.size(), false),
         loose_(problem.T_map_scan.size(), false),
-        surfaces_(problem, source, options) {
+        checked_(problem.T_map_scan.size(), false),
+        cut_(problem.T_map_scan.size(), false),
+        surfaces_(problem, source, options),
+        known_by_(problem.T_map_scan.size(), Matrix6d::Zero()),
+        slides_(problem.T_map_scan.size(), true) {
     result_.T_map_scan = problem.T_map_scan;
-    for (const ScanPair& pair : problem.pairs) {
-      if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
-    }
-    for (const RelativePoseTerm& motion : problem.odometry) odometry_[motion.j] = &motion;
+    FindMeasured();
+    for (const RelativePoseTerm& motion : problem_.odometry) odometry_[motion.j] = &motion;
     for (const std::size_t node : problem.lost) lost_[node] = true;
   }
 
   absl::StatusOr<AlignmentResult> Run(AlignmentProgress progress) {
     std::vector<Pose> before_last;
-    for (int round = 0; round < options_.max_rounds; ++round) {
-      STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / options_.max_rounds));
+    int rounds = options_.max_rounds;
+    for (int round = 0; round < rounds; ++round) {
+      STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / rounds));
       std::vector<Pose> last = result_.T_map_scan;
       const std::vector<bool> loose = loose_;
       STRATA_RETURN_IF_ERROR(Round());
-      // What was pooled across a step that turned out loose is still in force.
-      if (loose_ != loose) {
+      bool is_at_rest = false;
+      if (loose_ != loose) {  // what was pooled across such a step is still in force
         before_last.clear();
+      } else {
+        is_at_rest = IsAtRest(last, before_last);
+        before_last = std::move(last);
+      }
+      if (!is_at_rest && round + 1 < rounds) continue;
+      STRATA_ASSIGN_OR_RETURN(const bool is_cut, CutFalseSteps());
+      if (is_cut) {
+        before_last.clear();
+        rounds = std::max(rounds, round + 1 + options_.max_rounds);
         continue;
       }
-      if (IsSettled(last) && !surfaces_.MayNarrow()) {
-        result_.termination = AlignmentTermination::kSettled;
-        break;
-      }
-      if (!before_last.empty() && IsSettled(before_last)) {  // it swings between two states
-        for (std::size_t k = 0; k < last.size(); ++k) {
-          result_.T_map_scan[k] = HalfWay(last[k], result_.T_map_scan[k]);
-        }
-        result_.termination = AlignmentTermination::kSettled;
-        break;
-      }
-      before_last = std::move(last);
+      if (is_at_rest) result_.termination = AlignmentTermination::kSettled;
+      break;
     }
     STRATA_RETURN_IF_ERROR(progress(1.0));
     return std::move(result_);
@@ -121,11 +134,92 @@ class Alignment {
  private:
   const Pose& pose(std::size_t node) const { return result_.T_map_scan[node]; }
 
+  // Whether poses have settled. Where they swing between two states they are set half way.
+  bool IsAtRest(const std::vector<Pose>& last, const std::vector<Pose>& before_last) {
+    if (IsSettled(last) && !surfaces_.MayNarrow()) return true;
+    if (before_last.empty() || !IsSettled(before_last)) return false;
+    for (std::size_t k = 0; k < last.size(); ++k) {
+      result_.T_map_scan[k] = HalfWay(last[k], result_.T_map_scan[k]);
+    }
+    return true;
+  }
+
   // Whether every scan is where it was.
   bool IsSettled(const std::vector<Pose>& before) const {
     for (std::size_t k = 0; k < before.size(); ++k) {
       if (!Near(before[k], pose(k), options_.settled_m, options_.settled_rad)) return false;
     }
+    return true;
+  }
+
+  void FindMeasured() {
+    measured_.assign(matches_.size(), {});
+    for (const ScanPair& pair : problem_.pairs) {
+      if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
+    }
+  }
+
+  // Those that are joined by a match that nobody verified, or that says something else than the
+  // robot, and that were not checked yet.
+  std::vector<DoubtfulStep> DoubtfulSteps() const {
+    std::vector<DoubtfulStep> steps;
+    for (const std::vector<std::size_t>& way : ways_) {
+      const std::optional<OdometryNoise> noise = NoiseOf(way);
+      for (std::size_t k = 1; k < way.size(); ++k) {
+        const std::size_t node = way[k];
+        if (checked_[node] || odometry_[node] == nullptr || !AreOnePart(way[k - 1], node)) continue;
+        const Pose error =
+            odometry_[node]->T_i_j.inverse() * pose(odometry_[node]->i).inverse() * pose(node);
+        if (!lost_[node] && !IsJump(error, noise.value_or(OdometryNoise()))) continue;
+        steps.push_back(StepTo(way, k));
+      }
+    }
+    return steps;
+  }
+
+  bool AreOnePart(std::size_t a, std::size_t b) const {
+    return result_.parts[a] == result_.parts[b];
+  }
+
+  DoubtfulStep StepTo(const std::vector<std::size_t>& way, std::size_t k) const {
+    DoubtfulStep step;
+    const auto begins_anew = [&](std::size_t i) { return lost_[way[i]] || cut_[way[i]]; };
+    for (std::size_t i = k; i > 0 && step.before.size() < kCheckedBefore; --i) {
+      if ((i < k && begins_anew(i)) || !AreOnePart(way[i - 1], way[k])) break;
+      step.before.push_back(way[i - 1]);
+    }
+    for (std::size_t i = k; i < way.size() && step.after.size() < kCheckedAfter; ++i) {
+      if ((i > k && begins_anew(i)) || !AreOnePart(way[i], way[k])) break;
+      step.after.push_back(way[i]);
+    }
+    const RelativePoseTerm& said = *odometry_[way[k]];
+    step.is_verified = !lost_[way[k]];
+    step.T_said_found = pose(said.i) * said.T_i_j * pose(way[k]).inverse();
+    return step;
+  }
+
+  // Takes out what does not hold, as if nothing had been found there. Whether there was any.
+  absl::StatusOr<bool> CutFalseSteps() {
+    const std::vector<DoubtfulStep> steps = DoubtfulSteps();
+    std::vector<char> holds(steps.size(), 1);
+    STRATA_RETURN_IF_ERROR(for_each_(steps.size(), [&](std::size_t k) -> absl::Status {
+      STRATA_RETURN_IF_ERROR(stop_.status());
+      STRATA_ASSIGN_OR_RETURN(
+          holds[k], StepHolds(steps[k], result_.T_map_scan, source_, options_.registration));
+      return absl::OkStatus();
+    }));
+    bool is_any = false;
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      const std::size_t node = steps[k].after[0];
+      checked_[node] = true;
+      if (holds[k] != 0) continue;
+      cut_[node] = true;
+      is_any = true;
+    }
+    if (!is_any) return false;
+    CutBefore(cut_, problem_);
+    chains_ = ScanChains(problem_, options_.neighbours);
+    FindMeasured();
     return true;
   }
 
@@ -284,6 +378,7 @@ class Alignment {
     for (const std::size_t i : Nearest(seen, result.T_target_source, partners)) {
       match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
     }
+    match.joins_nothing = (match.chain.may_be_false || lost_[node]) && Slides(node, match.Share());
     return match;
   }
 
@@ -314,16 +409,14 @@ class Alignment {
     graph.priors = problem_.priors;
     graph.relative = problem_.relative;
     graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
+    joins_nothing_.assign(graph.relative.size(), false);
     std::vector<bool> known(matches_.size(), false);
     std::vector<Matrix6d> information(matches_.size(), Matrix6d::Zero());
     for (std::size_t node = 0; node < matches_.size(); ++node) {
       for (const Match& match : matches_[node]) {
         for (const auto& [i, T_i_scan] : match.T_i_scan) {
-          graph.relative.push_back({i,
-                                    node,
-                                    T_i_scan,
-                                    match.information / static_cast<double>(match.T_i_scan.size()),
-                                    match.chain.may_be_false});
+          graph.relative.push_back({i, node, T_i_scan, match.Share(), match.chain.may_be_false});
+          joins_nothing_.push_back(match.joins_nothing);
         }
         if (!match.good || match.chain.may_be_false) continue;
         known[node] = true;
@@ -336,6 +429,7 @@ class Alignment {
             IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
         graph.relative.push_back(
             {pair->i, node, pair->measured->T_i_j, loosened, pair->may_be_false});
+        joins_nothing_.push_back((pair->may_be_false || lost_[node]) && Slides(node, loosened));
         information[node] += loosened;
       }
       known[node] = true;
@@ -359,11 +453,11 @@ class Alignment {
                    const std::vector<Matrix6d>& information,
                    PoseGraphProblem& graph) {
     result_.sliding.clear();
-    for (const std::vector<std::size_t>& trajectory : problem_.trajectories) {
+    for (const std::vector<std::size_t>& trajectory : ways_) {
       const std::optional<OdometryNoise> noise = NoiseOf(trajectory);
       for (const std::size_t node : trajectory) {
-        if (odometry_[node] == nullptr || !known[node]) continue;
-        const bool slides = Slides(node, information[node]);
+        if (odometry_[node] == nullptr || !known[node] || cut_[node]) continue;
+        const bool slides = SlidesBy(node, information[node]);
         if (slides) result_.sliding.push_back(node);
         const std::optional<Pose> error = OdometryError(node);
         const bool is_jump = noise.has_value() && error.has_value() && IsJump(*error, *noise);
@@ -380,6 +474,31 @@ class Alignment {
       }
     }
     std::ranges::sort(result_.sliding);
+    AddWords(graph);
+  }
+
+  // Of steps that were cut, where nothing else joins what is on both sides.
+  void AddWords(PoseGraphProblem& graph) const {
+    std::vector<bool> not_believed(graph.relative.size(), false);
+    for (std::size_t k = 0; k < measured_end_; ++k) {
+      const auto known = believed_.find(DecisionOn(graph, k));
+      not_believed[k] =
+          graph.relative[k].may_be_false && known != believed_.end() && !known->second;
+    }
+    DisjointSets joined = JoinedBy(graph.relative, not_believed, measured_end_);
+    for (std::size_t node = 0; node < cut_.size(); ++node) {
+      if (!cut_[node] || joined.AreJoined(odometry_[node]->i, node)) continue;
+      graph.relative.push_back(*odometry_[node]);
+    }
+  }
+
+  // The same of all that is known of it, which changes little from round to round.
+  bool SlidesBy(std::size_t node, const Matrix6d& information) {
+    if (known_by_[node] != information) {
+      known_by_[node] = information;
+      slides_[node] = Slides(node, information);
+    }
+    return slides_[node];
   }
 
   // Whether what is known of a node leaves a direction to its odometry.
@@ -424,13 +543,9 @@ class Alignment {
   // that two are near by the graph, or by the word of a robot that was found wrong, is all that
   // joins them.
   DisjointSets Joined(const PoseGraphProblem& graph, const PoseGraphSummary& summary) const {
-    std::vector<bool> joins_nothing(graph.relative.size(), false);
+    std::vector<bool> joins_nothing = joins_nothing_;
+    joins_nothing.resize(graph.relative.size(), false);
     for (const auto& [k, chi2] : summary.rejected_relative) joins_nothing[k] = true;
-    for (std::size_t k = problem_.relative.size(); k < measured_end_; ++k) {
-      const RelativePoseTerm& term = graph.relative[k];
-      const bool is_doubtful = term.may_be_false || lost_[term.j];
-      if (is_doubtful && Slides(term.j, term.information)) joins_nothing[k] = true;
-    }
     return JoinedBy(graph.relative, joins_nothing, measured_end_);
   }
 
@@ -477,60 +592,29 @@ class Alignment {
     result_.worst_nodes = std::move(solution.summary.worst_nodes);
   }
 
-  const AlignmentProblem& problem_;
+  const std::vector<std::vector<std::size_t>>& ways_;  // of robots, whole
+  AlignmentProblem problem_;                           // without what was taken out
   AlignmentSource& source_;
   const AlignmentOptions& options_;
   const ForEach for_each_;
   const Stop& stop_;
-  const ScanChains chains_;
+  ScanChains chains_;
   std::vector<std::vector<Match>> matches_;             // of every node
   std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
   std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
   std::vector<bool> lost_;                              // of every node
   std::vector<bool> loose_;                             // of every node, in the round before
+  std::vector<bool> checked_;                           // of every node: the step to it
+  std::vector<bool> cut_;  // of every node: the step to it does not hold
   SharedSurfaces surfaces_;
   std::map<Decision, bool> believed_;  // in the round before
   std::vector<bool> believed_priors_;
+  std::vector<bool> joins_nothing_;  // of the graph's relative terms, up to measured_end_
+  std::vector<Matrix6d> known_by_;   // of every node: what slides_ was asked of
+  std::vector<bool> slides_;
   std::size_t measured_end_ = 0;  // of the graph's relative terms: what is given or a match
   AlignmentResult result_;
 };
-
-absl::Status CheckProblem(const AlignmentProblem& problem) {
-  const std::size_t nodes = problem.T_map_scan.size();
-  for (const Pose& T_map_scan : problem.T_map_scan) {
-    STRATA_RETURN_IF_ERROR(ValidatePose(T_map_scan));
-  }
-  for (const ScanPair& pair : problem.pairs) {
-    if (pair.i >= nodes || pair.j >= nodes || pair.i == pair.j) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "pair of scans ", pair.i, " and ", pair.j, ": not two different ones of ", nodes));
-    }
-  }
-  for (const RelativePoseTerm& motion : problem.odometry) {
-    if (motion.i >= nodes || motion.j >= nodes || motion.i == motion.j) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "odometry from ", motion.i, " to ", motion.j, ": not two different ones of ", nodes));
-    }
-  }
-  for (const std::size_t node : problem.lost) {
-    if (node >= nodes) {
-      return absl::InvalidArgumentError(absl::StrCat("lost: node ", node, " is none of ", nodes));
-    }
-  }
-  std::vector<int> seen(nodes, 0);
-  for (const std::vector<std::size_t>& trajectory : problem.trajectories) {
-    for (const std::size_t node : trajectory) {
-      if (node >= nodes || ++seen[node] > 1) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("trajectories: node ", node, " is none or there twice"));
-      }
-    }
-  }
-  if (std::find(seen.begin(), seen.end(), 0) != seen.end()) {
-    return absl::InvalidArgumentError("trajectories: a node is in none");
-  }
-  return absl::OkStatus();
-}
 
 }  // namespace
 

@@ -101,7 +101,8 @@ struct AlignmentOptions {
   // narrows to the default as poses settle.
   SharedPlaneOptions shared_planes;
   PoseGraphOptions pose_graph;
-  int max_rounds = 30;  // in [1, 100]
+  // In [1, 100]; as many again where steps turn out false at the end of them.
+  int max_rounds = 30;
   // Settled once no scan moved farther in a round, or in two where poses swing: as much as a
   // registration is good for.
   double settled_m = 0.01;

@@ -420,6 +420,32 @@ TEST_F(AlignmentTest, NothingIsPooledAcrossAStepThatNobodyMeasured) {
   }
 }
 
+// What says something else than the robot is looked at again once poses have settled, and taken out
+// where scans speak against it.
+TEST_F(AlignmentTest, AStepThatScansSpeakAgainstIsTheRobotsWord) {
+  constexpr std::size_t kJump = 3;
+  problem_ = {};
+  problem_.trajectories.resize(1);
+  Pose off = Pose::Identity();
+  for (std::size_t k = 0; k < YardScans::kFirst; ++k) {
+    if (k == kJump) off.translation() = Eigen::Vector3d(1.5, 3.0, 0.0);
+    problem_.T_map_scan.push_back(off * yard().truth()[k]);
+    problem_.trajectories[0].push_back(k);
+    if (k == 0) continue;
+    const Pose found = problem_.T_map_scan[k - 1].inverse() * problem_.T_map_scan[k];
+    ScanPair& pair = problem_.pairs.emplace_back(ScanPair{k - 1, k});
+    pair.measured = MeasuredPose{found, IsotropicInformation(0.001, 0.01)};
+    problem_.odometry.push_back({k - 1, k, TrueStep(k - 1, k), IsotropicInformation(0.005, 0.05)});
+  }
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align());
+  for (std::size_t k = 0; k < YardScans::kFirst; ++k) {
+    const Pose is = result.T_map_scan[0].inverse() * result.T_map_scan[k];
+    EXPECT_LT((is.translation() - TrueStep(0, k).translation()).norm(), 0.1) << k;
+    EXPECT_EQ(result.parts[k] == result.parts[0], k < kJump) << k;
+  }
+  EXPECT_EQ(result.termination, AlignmentTermination::kSettled);
+}
+
 // A floor with nothing on it.
 class FloorScans final : public AlignmentSource {
  public:
