@@ -37,6 +37,19 @@ bool OppositeSides(const Eigen::Vector3d& p,
          std::abs(side_b) > kGrazing * (b - p).norm();
 }
 
+// True if the target's surface was seen from nowhere but the other side: a deck's underside by all
+// who drove below it, say. Beams of a sparse scan draw lines on that which look like tops.
+bool IsOtherSide(const SurfaceElement& q,
+                 const Eigen::Vector3f& normal_source,
+                 const Eigen::Vector3d& sensor,
+                 const RegistrationTarget& target) {
+  if (target.sensors().empty()) return false;
+  const Eigen::Vector3f& normal = q.normal.isZero() ? normal_source : q.normal;
+  return std::ranges::all_of(target.sensors(), [&](const Eigen::Vector3d& other) {
+    return OppositeSides(q.point.cast<double>(), normal.cast<double>(), sensor, other);
+  });
+}
+
 // Where beams draw lines on a wall, a cell wide and far apart, neighbours lie on a level strip. Its
 // height goes with the distance of the sensor: held against each other such strips lift whatever is
 // in front of a robot, and a chain of scans bends upwards. So features more than 3° above the
@@ -153,10 +166,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
              : TargetSurface{{grid.points()[j], normal}};
     if (surface.is_other_face) continue;
     const SurfaceElement& q = surface.element;
-    if (target_.sensor().has_value() &&
-        OppositeSides(q.point.cast<double>(), q.normal.cast<double>(), sensor, *target_.sensor())) {
-      continue;
-    }
+    if (IsOtherSide(q, normal, sensor, target_)) continue;
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();

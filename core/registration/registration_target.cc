@@ -152,8 +152,10 @@ absl::Status TargetOptions::Validate() const {
 RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
                                        const TargetOptions& options)
     : origin_(options.centre) {
-  if (scans.size() == 1 && options.from_one_place) {
-    sensor_ = scans[0].T_target_scan * scans[0].features->sensor_origin() - origin_;
+  if (options.from_one_place) {
+    for (const PlacedScan& scan : scans) {
+      sensors_.push_back(scan.T_target_scan * scan.features->sensor_origin() - origin_);
+    }
   }
   const bool averaged = scans.size() > 1 && options.thinning_m > 0.0;
   for (int c = 0; c < kFeatureClasses; ++c) {
@@ -180,7 +182,8 @@ std::size_t RegistrationTarget::size() const {
 }
 
 std::size_t RegistrationTarget::memory_bytes() const {
-  std::size_t bytes = sizeof(*this) + upright_sides_.capacity() * sizeof(SeenSides);
+  std::size_t bytes = sizeof(*this) + upright_sides_.capacity() * sizeof(SeenSides) +
+                      sensors_.capacity() * sizeof(Eigen::Vector3d);
   for (const auto& grid : grids_) bytes += grid->memory_bytes();
   return bytes;
 }

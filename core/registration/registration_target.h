@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,7 +26,7 @@ struct TargetOptions {
   // Features of several scans that share a cube of this edge and a class are averaged into one
   // [m]; in [0, 10], 0 keeps all. A single scan is never thinned.
   double thinning_m = 0.1;
-  // A single scan was seen from its sensor; false for what many scans have made.
+  // Each scan was seen from its sensor; false for what many scans have made.
   bool from_one_place = true;
   // Features farther than this (horizontally) from the centre are left out [m]; in [1, 10000].
   double radius_m = 120.0;
@@ -54,9 +53,9 @@ class RegistrationTarget {
   explicit RegistrationTarget(std::span<const PlacedScan> scans, const TargetOptions& options = {});
 
   const ColumnGrid& grid(FeatureClass c) const { return *grids_[static_cast<std::size_t>(c)]; }
-  // Where all of it was seen from, in the grids' coordinates: of a single scan; of several nobody
-  // knows which saw what.
-  const std::optional<Eigen::Vector3d>& sensor() const { return sensor_; }
+  // Where it was seen from, in the grids' coordinates; which saw what is not known. Empty: that is
+  // not known either.
+  const std::vector<Eigen::Vector3d>& sensors() const { return sensors_; }
   // Of each of grid(kVertical).points() if several scans were averaged; empty otherwise.
   const std::vector<SeenSides>& upright_sides() const { return upright_sides_; }
   // Origin of the grids' coordinates, in the target frame.
@@ -66,7 +65,7 @@ class RegistrationTarget {
 
  private:
   std::array<std::shared_ptr<const ColumnGrid>, kFeatureClasses> grids_;  // never null
-  std::optional<Eigen::Vector3d> sensor_;
+  std::vector<Eigen::Vector3d> sensors_;
   std::vector<SeenSides> upright_sides_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };

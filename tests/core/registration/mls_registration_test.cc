@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -255,6 +257,34 @@ TEST(RegisterScanTest, TheTwoSidesOfAThinWallAreNotDrawnOntoEachOther) {
   // Seen from the same side it is one.
   const ScanFeatures again = Features(Hut(3.0, outside, 3));
   EXPECT_TRUE(RegisterScan(again, target, Pose::Identity()).inliers > 500);
+}
+
+// The level surface of a deck as a scan sees it that was taken at `p_scan`, all of it a top: as the
+// lines are that sparse beams draw on an underside.
+ScanFeatures Deck(double z, const Eigen::Vector3d& p_scan) {
+  std::array<std::vector<Eigen::Vector3f>, kFeatureClasses> points;
+  for (int x = -40; x < 40; ++x) {
+    for (int y = -10; y < 10; ++y) {
+      points[0].push_back((Eigen::Vector3d(0.2 * x, 0.2 * y, z) - p_scan).cast<float>());
+    }
+  }
+  return ScanFeatures::FromPoints(points);
+}
+
+TEST(RegisterScanTest, WhatSeveralScansSawFromBelowIsNotMatchedToATop) {
+  const std::vector<Eigen::Vector3d> places = {{0.0, -3.0, 1.2}, {1.0, 3.0, 1.2}, {4.0, 0.0, 6.7}};
+  const std::vector<ScanFeatures> scans = {
+      Deck(5.15, places[0]), Deck(5.15, places[1]), Deck(5.5, places[2])};
+  std::vector<PlacedScan> placed;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    placed.push_back({&scans[k], Pose(Eigen::Translation3d(places[k]))});
+  }
+  const Pose above = MakePose(Eigen::Quaterniond::Identity(), {-1.0, 0.0, 6.7});
+  const ScanFeatures source = Deck(5.5, above.translation());
+  const RegistrationTarget from_below(std::span<const PlacedScan>(placed).first(2));
+  EXPECT_EQ(RegisterScan(source, from_below, above).termination, Termination::kTooLittleOverlap);
+  // Where one of them stood on the deck it is one.
+  EXPECT_GT(RegisterScan(source, RegistrationTarget(placed), above).overlap, 0.95);
 }
 
 TEST(RegisterScanTest, ClassesAreMatchedAmongThemselvesOnly) {

@@ -87,7 +87,7 @@ TEST_F(PlaceMatchTest, AScanAgreesWithAMapWhereItWasTaken) {
   const ScanFeatures scan = FeaturesAt(world.scene, T_map_i * T_i_j, 2);
   const PlacedScan placed[] = {{&surfaces, Pose::Identity()}};
   const RegistrationTarget target(placed, {.from_one_place = false});
-  EXPECT_FALSE(target.sensor().has_value());
+  EXPECT_TRUE(target.sensors().empty());
   const MapAgreement there = AgreementWithMap({&scan, T_i_j}, surfaces, target, 0.2);
   EXPECT_GT(there.overlap, 0.8);
   EXPECT_GT(there.close, 0.7);

@@ -38,7 +38,7 @@ TEST(MapSurfacesTest, SurfacesAreFeaturesOfTheirClass) {
   for (const Eigen::Vector3f& p : walls) sum += p.z();
   EXPECT_NEAR(sum / 8.0F, 2.0F, 1e-5F);  // the middle of 2 to 4 m, less 1
   EXPECT_EQ(surfaces.target.size(), surfaces.features.size());
-  EXPECT_FALSE(surfaces.target.sensor().has_value());
+  EXPECT_TRUE(surfaces.target.sensors().empty());
 }
 
 TEST(MapSurfacesTest, OverviewsHaveWiderCells) {
