@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
@@ -198,6 +199,26 @@ TEST(ViewpointsTest, GoesUpTheRampToAnotherLevel) {
   STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult near, world.Explore(query));
   EXPECT_EQ(near.reason, ExploreReason::kExplored);
   EXPECT_THAT(near.message, HasSubstr("within 8 m"));
+}
+
+// What is left of it tells less than the ramp, whose foot is nearer.
+TEST(ViewpointsTest, FinishesALevelBeforeItGoesToAnother) {
+  World world;
+  for (double x = 2.0; x < 16.0; x += 4.0) {
+    world.See({x, 2.0, 1.0});
+    world.See({x, 6.0, 1.0});
+  }
+  ExploreQuery query = Query(4.0, 9.0);
+  query.region = {Vector3d(14.0, 0.0, -0.4), Vector3d(24.0, 12.0, 4.0)};
+  query.sensor.max_range_m = 5.0;
+  query.count = 10;
+  STRATA_ASSERT_OK_AND_ASSIGN(const ExploreResult result, world.Explore(query));
+  const std::vector<ExploreView>& views = result.views;
+  const auto is_below = [](const ExploreView& view) { return view.place.z() < kLevelM; };
+  const auto first_above = std::find_if_not(views.begin(), views.end(), is_below);
+  ASSERT_TRUE(first_above != views.begin() && first_above != views.end()) << result.message;
+  EXPECT_TRUE(std::none_of(first_above, views.end(), is_below));
+  EXPECT_GT(first_above->gain_bits, 2.0 * std::prev(first_above)->gain_bits);
 }
 
 TEST(ViewpointsTest, LaterViewsAreWorthLess) {
