@@ -290,9 +290,13 @@ absl::StatusOr<OptimizeVerdict> VerdictOn(const GraphWorld& world,
   STRATA_RETURN_IF_ERROR(Compare(world, views, result, verdict));
   verdict.priors = result.priors;
   verdict.priors_rejected = result.rejected_priors;
-  verdict.is_sound =
-      !PriorsContradict(verdict) && !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
-      !IsTooMany(verdict.contradicted_pairs.size(), verdict.compared) && verdict.at_odds.empty();
+  // What a step that nothing holds leads to swings for as long as rounds go on.
+  const bool swings =
+      result.termination != AlignmentTermination::kSettled && !verdict.loose_steps.empty();
+  verdict.is_sound = !PriorsContradict(verdict) &&
+                     !IsTooMany(verdict.loose_steps.size(), verdict.steps) &&
+                     !IsTooMany(verdict.contradicted_pairs.size(), verdict.compared) &&
+                     verdict.at_odds.empty() && !swings;
   verdict.message = absl::StrCat(StepsMessage(world, verdict),
                                  PairsMessage(world, verdict),
                                  PriorsMessage(verdict),

@@ -19,7 +19,7 @@ namespace strata {
 
 struct OptimizeVerdict {
   // False: too little was measured to move scans by, or scans contradict each other or what else is
-  // known of their places where they end up.
+  // known of their places where they end up, or poses did not settle and a step is loose.
   bool is_sound = true;
   std::size_t steps = 0;  // from scan to scan along trajectories
   // Those whose two scans no match, closure or given constraint joins, on any way: the nodes from

@@ -57,5 +57,19 @@ TEST_F(OptimizeVerdictTest, WhatMaySlideIsSaidBesideWhatNothingJoins) {
   EXPECT_THAT(job.message, HasSubstr("Good within each part but for what may slide."));
 }
 
+// Such poses may be off by metres, and further from the truth than before.
+TEST_F(OptimizeVerdictTest, WhatDoesNotSettleAroundALooseStepIsProposed) {
+  MakeMap(MapParameters());
+  for (std::uint64_t k = 1; k <= kScans; ++k) {
+    UploadScan(k, k < 4 ? TruthOf(k) : PoseAt(5.0, 60.0, 0.3) * TruthOf(k));
+  }
+  WaitIntegrated(db());
+  const JobInfo job = Optimize({{"rounds", "1"}});
+  EXPECT_EQ(job.state, JobState::kProposed) << job.message;
+  EXPECT_THAT(job.message, HasSubstr("not settled after 1 rounds"));
+  EXPECT_THAT(job.message, HasSubstr("1 of 5 steps from scan to scan are the robot's word alone"));
+  EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
+}
+
 }  // namespace
 }  // namespace strata::testing
