@@ -65,7 +65,7 @@ class EditBesideTest : public EngineTest {
   PostgresMaps ConnectAs(const std::string& name) const {
     PostgresOptions options;
     options.where = store_;
-    options.lease = {.holder = name, .server = name, .time = absl::Minutes(10)};
+    options.lease = {.holder = name, .server = name, .roles = {}, .time = absl::Minutes(10)};
     auto maps = PostgresMaps::Connect(options);
     STRATA_EXPECT_OK(maps);
     return *std::move(maps);
