@@ -443,7 +443,8 @@ absl::Status JobBoard::ReturnDead(const std::set<std::string>& alive) {
       if (!alive.contains(HolderOf(run_by))) dead.emplace(id, std::move(run_by));
     }
   }
-  for (const auto& [id, run_by] : dead) {
+  for (const auto& [id, holder] : dead) {
+    const std::string& run_by = holder;  // clang 14 lets no lambda have a binding
     const absl::Status returned =
         Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) {
           if (RunsElsewhere(job) && RunBy(job) == run_by) return ReturnDeadJob(job, writer);
