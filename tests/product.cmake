@@ -4,7 +4,7 @@
 # strata_product_test(NAME LABEL COST COMMAND...): COST in seconds, so that what takes long begins first. 77: nothing to try it on.
 function(strata_product_test name label cost)
   add_test(NAME ${name} COMMAND ${ARGN})
-  set_tests_properties(${name} PROPERTIES LABELS ${label} TIMEOUT 900 COST ${cost} SKIP_RETURN_CODE 77)
+  set_tests_properties(${name} PROPERTIES LABELS ${label} COST ${cost} SKIP_RETURN_CODE 77)
 endfunction()
 
 set(python /usr/bin/python3)

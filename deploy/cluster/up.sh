@@ -59,9 +59,9 @@ stop_all() {
 trap "stop_all 2>/dev/null" EXIT
 trap 'exit 130' INT TERM
 step() { printf '== %s\n' "$*"; }
-# Until the command succeeds, for at most a minute.
+# Until the command succeeds, for at most five minutes.
 await() {
-  local end=$((SECONDS + 60))
+  local end=$((SECONDS + 300))
   while ((SECONDS < end)); do "$@" >/dev/null 2>&1 && return; sleep 0.2; done
   echo "up: waited in vain for: $*" >&2
   return 1

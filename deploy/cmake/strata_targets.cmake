@@ -135,27 +135,25 @@ function(strata_executable name output)
   strata_batch(${name} ${ARG_SHARED_HEADERS})
 endfunction()
 
-# strata_test(NAME SOURCES... DEPS... [LABELS...] [TIMEOUT seconds] [PROCESSORS n] [TOGETHER suites...])
+# strata_test(NAME SOURCES... DEPS... [LABELS...] [COST seconds] [PROCESSORS n] [TOGETHER suites...])
 #
-# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and
-# tsan also make it part of what tests/run_sanitizers.sh builds and runs. TIMEOUT: what it takes at most on a machine that
-# does little else; after four times that it hangs, and is ended. PROCESSORS: of those that ctest has, as many as a
-# test takes that goes by the clock. TOGETHER: each of these suites is one ctest test, and one process, for which what its
-# tests share is made once; ALL: the program is, whose many short tests would take longer to start than to run.
+# A GoogleTest program; every TEST becomes a ctest test with the labels (default: unit). The labels asan, bytes and tsan
+# also make it part of what tests/run_sanitizers.sh builds and runs. COST: what it takes at most on a machine that does
+# little else; what may take long begins first. PROCESSORS: of those that ctest has, as many as a test takes that goes by
+# the clock. TOGETHER: each of these suites is one ctest test, and one process, for which what its tests share is made
+# once; ALL: the program is, whose many short tests would take longer to start than to run. No test has a time of its own
+# after which it hangs: a machine at a tenth of its speed failed the gate by nothing else. CMakePresets.json has one for
+# all.
 function(strata_test name)
-  cmake_parse_arguments(ARG "" "PROCESSORS;TIMEOUT" "SOURCES;DEPS;LABELS;TOGETHER" ${ARGN})
+  cmake_parse_arguments(ARG "" "PROCESSORS;COST" "SOURCES;DEPS;LABELS;TOGETHER" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
-  if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
+  if(NOT ARG_COST)
+    set(ARG_COST 120)
   endif()
   if(NOT ARG_PROCESSORS)
     set(ARG_PROCESSORS 1)
-  endif()
-  math(EXPR hangs "${ARG_TIMEOUT} * 4")
-  if(STRATA_SANITIZER)
-    math(EXPR hangs "${hangs} * 4")
   endif()
   strata_executable(
     ${name} ${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gmock_main SHARED_HEADERS strata_test_headers
@@ -171,8 +169,7 @@ function(strata_test name)
   list(JOIN ARG_LABELS "-" labels) # gtest_discover_tests takes one word; ctest -L looks for a part of it
   set(alone "*")
   if(ARG_TOGETHER)
-    math(EXPR together_cost "5 * ${ARG_TIMEOUT}")
-    math(EXPR together_hangs "5 * ${hangs}")
+    math(EXPR together_cost "5 * ${ARG_COST}")
     set(alone "*-")
     foreach(suite ${ARG_TOGETHER})
       set(test ${suite})
@@ -184,7 +181,7 @@ function(strata_test name)
       string(APPEND alone "${tests}:")
       add_test(NAME ${test} COMMAND ${name} --gtest_filter=${tests})
       set_tests_properties(
-        ${test} PROPERTIES LABELS "${labels}" TIMEOUT ${together_hangs} PROCESSORS ${ARG_PROCESSORS} COST ${together_cost}
+        ${test} PROPERTIES LABELS "${labels}" PROCESSORS ${ARG_PROCESSORS} COST ${together_cost}
       )
     endforeach()
     if(ALL IN_LIST ARG_TOGETHER)
@@ -195,7 +192,6 @@ function(strata_test name)
     ${name}
     DISCOVERY_TIMEOUT 60
     TEST_FILTER "${alone}"
-    PROPERTIES LABELS "${labels}" TIMEOUT ${hangs} PROCESSORS ${ARG_PROCESSORS}
-               COST ${ARG_TIMEOUT} # what may take long begins first
+    PROPERTIES LABELS "${labels}" PROCESSORS ${ARG_PROCESSORS} COST ${ARG_COST}
   )
 endfunction()

@@ -25,4 +25,4 @@ strata_executable(
 # Table 4.1's bounds: what is closed, and how near meshes come with noise. Not of the gate, where mesh_test holds what is
 # closed; the whole table is the campaign `thesis`.
 add_test(NAME thesis_table_4_1 COMMAND mesh_methods stool 5)
-set_tests_properties(thesis_table_4_1 PROPERTIES LABELS "smoke;long" TIMEOUT 1200 COST 100)
+set_tests_properties(thesis_table_4_1 PROPERTIES LABELS "smoke;long" COST 100)

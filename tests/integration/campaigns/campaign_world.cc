@@ -214,7 +214,7 @@ void CampaignWorld::RetireRobotsAndCheck() {
 
 JobInfo CampaignWorld::RunJob(const std::string& kind) {
   JobInfo last;
-  const absl::Time end = absl::Now() + absl::Seconds(10);
+  const absl::Time end = absl::Now() + absl::Minutes(1);
   auto job = db().jobs().Start({}, kCampaignMap, kind, {});
   // A server may not know yet that its database is back; started twice it does no harm.
   while (absl::IsUnavailable(job.status()) && absl::Now() < end) {

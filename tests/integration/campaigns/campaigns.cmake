@@ -24,5 +24,5 @@ strata_test(
   SOURCES campaigns/kill_campaign_test.cc
   DEPS strata::campaigns
   LABELS integration
-  TIMEOUT 300
+  COST 300
 )

@@ -6,7 +6,7 @@ strata_test(
           ${PROJECT_SOURCE_DIR}/tests/client/cli/run_strata.cc
   DEPS strata::codec strata::robot_files strata::simulator strata::sdk strata::test_support nlohmann_json::nlohmann_json absl::str_format
   LABELS integration
-  TIMEOUT 300
+  COST 300
   TOGETHER ImportTest
 )
 add_dependencies(integration_cli_test stratad strata_cli strata_python)

@@ -7,7 +7,7 @@ strata_executable(
 )
 add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
-set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
+set_tests_properties(two_servers_test PROPERTIES LABELS integration COST 300)
 
 # The conformance suite by a gateway. Uploads that begin there do not go on where they broke, and tiles of earlier epochs are
 # the owner's.
@@ -21,7 +21,7 @@ add_test(
   NAME beside_suite_test
   COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*:*AnEarlierEpochHasTheTilesOfItsPoses*
 )
-set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 2400 COST 600)
+set_tests_properties(beside_suite_test PROPERTIES LABELS integration COST 600)
 
 # Plans by the server that has not got the map.
 strata_executable(
@@ -32,7 +32,7 @@ strata_executable(
 )
 add_dependencies(plans_elsewhere_test stratad)
 add_test(NAME plans_elsewhere_test COMMAND plans_elsewhere_test)
-set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
+set_tests_properties(plans_elsewhere_test PROPERTIES LABELS integration COST 300)
 
 # Edits by the server that has not got the map.
 strata_executable(
@@ -43,7 +43,7 @@ strata_executable(
 )
 add_dependencies(edits_elsewhere_test stratad)
 add_test(NAME edits_elsewhere_test COMMAND edits_elsewhere_test)
-set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration COST 300)
 
 # Servers that take maps and servers that do not; and maps that are deleted by those that have not got them.
 strata_executable(
@@ -54,7 +54,7 @@ strata_executable(
 )
 add_dependencies(roles_test stratad)
 add_test(NAME roles_test COMMAND roles_test)
-set_tests_properties(roles_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(roles_test PROPERTIES LABELS integration COST 300)
 
 # Watches by the server that has not got the map.
 strata_executable(
@@ -65,7 +65,7 @@ strata_executable(
 )
 add_dependencies(watch_elsewhere_test stratad)
 add_test(NAME watch_elsewhere_test COMMAND watch_elsewhere_test)
-set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
+set_tests_properties(watch_elsewhere_test PROPERTIES LABELS integration COST 300)
 
 # Maps between files and a database.
 strata_executable(
@@ -76,7 +76,7 @@ strata_executable(
 )
 add_dependencies(map_import_test stratad)
 add_test(NAME map_import_test COMMAND map_import_test)
-set_tests_properties(map_import_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
+set_tests_properties(map_import_test PROPERTIES LABELS integration COST 300)
 
 # The kill campaign with several servers of one database.
 strata_executable(unfenced_stratad unfenced_stratad SOURCES cluster/unfenced_stratad.cc DEPS strata::server_program)
@@ -93,5 +93,5 @@ strata_test(
   SOURCES cluster/cluster_campaign_test.cc
   DEPS strata::cluster_campaign
   LABELS integration
-  TIMEOUT 300
+  COST 300
 )

@@ -31,7 +31,7 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr absl::Duration kLease = absl::Seconds(1);
 // Within which somebody takes over and goes on acknowledging.
-constexpr absl::Duration kTakeOver = absl::Seconds(30);
+constexpr absl::Duration kTakeOver = absl::Minutes(3);
 
 // Commits that need not be durable are not, so that a crash of the database loses them.
 absl::Status KeepRelaxedCommitsBack(const std::string& database) {

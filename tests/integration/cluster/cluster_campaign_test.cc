@@ -23,7 +23,8 @@ class ClusterCampaignTest : public ::testing::Test {
     std::cout << "seed " << options_.world.seed << "\n";
     options_.world.folder = folder_.path();
     options_.world.robots = 2;
-    options_.world.period_ms = 100;
+    // Robots go on while a slow machine works: jobs take as long as there are scans.
+    options_.world.period_ms = 400;
     options_.world.columns = 160;
     options_.world.servers = 3;
     options_.robot_kills = 2;

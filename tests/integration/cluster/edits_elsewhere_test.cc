@@ -46,7 +46,7 @@ Pose Along(double x_m) {
 absl::Status SetX(api::Database& db,
                   std::uint64_t sequence,
                   double x_m,
-                  absl::Duration patience = absl::Seconds(30)) {
+                  absl::Duration patience = kPatience) {
   api::Call call;
   call.stop = Stop(SteadyNow() + patience);
   return db.posegraph().SetPose(call, kShared, Numbered(sequence), Along(x_m));

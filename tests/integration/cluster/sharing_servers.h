@@ -32,7 +32,7 @@
 namespace strata::testing {
 
 inline constexpr char kShared[] = "shared";
-inline constexpr absl::Duration kPatience = absl::Seconds(30);
+inline constexpr absl::Duration kPatience = absl::Minutes(3);
 
 class SharingServer {
  public:

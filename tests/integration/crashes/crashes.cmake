@@ -4,7 +4,7 @@ strata_test(
           crashes/optimize_crash_test.cc crashes/yard_clients.cc
   DEPS strata::codec strata::sdk strata::simulator strata::test_support
   LABELS integration
-  TIMEOUT 300
+  COST 300
 )
 add_dependencies(optimize_crash_test stratad)
 

@@ -6,6 +6,6 @@ strata_test(
        nlohmann_json::nlohmann_json
   LABELS integration
   PROCESSORS 2
-  TIMEOUT 300
+  COST 300
 )
 add_dependencies(ros2_test stratad strata_cli strata_ros2_program)
