@@ -3,6 +3,10 @@
 #ifndef STRATA_CORE_MLS_LOCAL_PLANE_H_
 #define STRATA_CORE_MLS_LOCAL_PLANE_H_
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <optional>
 
 #include <Eigen/Core>
@@ -29,8 +33,49 @@ struct HeightSample {
 // A deck whose underside is at most so far below a surface may be what the surface goes on with:
 // where its top was not seen, that is unknown ground and no drop to what lies below the deck [m].
 inline constexpr float kMaxDeckM = 1.0F;
+// Sparse beams leave cells of a deck without a hit, over what was seen from below: gaps between
+// rings. What along an axis ends on both sides within so little is taken for such cells [m], and
+// what is measured in it at least so far down [m] for what others saw: from above, nobody sees the
+// bottom of what is deeper than it is wide.
+inline constexpr double kMaxUnseenDeckM = 0.2;
+inline constexpr float kLeastUnseenDropM = 0.25F;
+// The farthest cell that DeckGoesOn() asks for, along an axis.
+inline constexpr int kMaxUnseenDeckCells = 4;
 
 HeightSample SampleOf(const Surface& surface, double cell_size_m);
+
+// True if a deck of height z_m goes on at a cell in which no beam hit it: nothing was measured
+// from kLeastUnseenDropM below that height up to kMaxDeckM above it there, and along an axis tops
+// of the deck (within 45° of its height) end what is like it, on both sides, within
+// kMaxUnseenDeckM. `column(dx, dy)`: the surfaces of the cell so far away, a range of HeightSample;
+// undersides do not count.
+template <typename ColumnAt>
+bool DeckGoesOn(float z_m, double cell_size_m, const ColumnAt& column) {
+  enum class Met : std::uint8_t { kNothing, kTop, kBody };
+  const auto meet = [&](int dx, int dy) {
+    const auto reach = static_cast<float>((std::abs(dx) + std::abs(dy)) * cell_size_m);
+    Met met = Met::kNothing;
+    for (const HeightSample& sample : column(dx, dy)) {
+      if (sample.underside()) continue;
+      if (std::abs(sample.z_m - z_m) <= reach) return Met::kTop;
+      if (sample.z_m > z_m - kLeastUnseenDropM && sample.bottom_m <= z_m + kMaxDeckM) {
+        met = Met::kBody;
+      }
+    }
+    return met;
+  };
+  const int limit =
+      std::min(kMaxUnseenDeckCells, static_cast<int>(kMaxUnseenDeckM / cell_size_m + 1e-6));
+  const auto run = [&](int dx, int dy) {  // of cells without a top
+    for (int n = 1; n <= limit; ++n) {
+      const Met met = meet(n * dx, n * dy);
+      if (met != Met::kNothing) return met == Met::kTop ? n - 1 : limit;
+    }
+    return limit;
+  };
+  return meet(0, 0) == Met::kNothing &&
+         (run(1, 0) + run(-1, 0) < limit || run(0, 1) + run(0, -1) < limit);
+}
 
 // z = height + gradient · (x, y), in the coordinates given to LocalPlaneFit.
 struct LocalPlane {

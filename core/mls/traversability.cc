@@ -21,7 +21,8 @@
 namespace strata {
 namespace {
 
-constexpr int kMargin = kPlaneRadiusCells;
+// Next to a surface a cell may be one of an unseen deck.
+constexpr int kMargin = std::max(kPlaneRadiusCells, 1 + kMaxUnseenDeckCells);
 constexpr int kPaddedCells = kTileCells + 2 * kMargin;
 constexpr double kMaxRatio = 4.0;
 constexpr std::array<std::array<int, 2>, 4> kQuarters = {{{1, 1}, {-1, 1}, {1, -1}, {-1, -1}}};
@@ -267,7 +268,7 @@ class Judge {
   // that is all above the robot's head, or below a deck.
   bool Blocks(int cell, const HeightSample& self, double step_m) const {
     if (UndersideBlocks(cell, self, step_m)) return true;
-    const bool hidden = HidesGround(cell, self, step_m);
+    const bool hidden = HidesGround(cell, self, step_m) || DeckIsUnseen(cell, self);
     const std::span<const HeightSample> column = padded_.Cell(cell);
     return std::any_of(column.begin(), column.end(), [&](const HeightSample& sample) {
       return sample.z_m < self.z_m ? !hidden : IsOverhead(sample, self);
@@ -286,6 +287,13 @@ class Judge {
     return std::any_of(undersides.begin(), undersides.end(), [&](const HeightSample& underside) {
       const double dz = double{underside.z_m} - self.z_m;
       return dz >= -kMaxDeckM && dz <= step_m;
+    });
+  }
+
+  // True if the deck that `self` is on goes on there, though no beam hit it.
+  bool DeckIsUnseen(int cell, const HeightSample& self) const {
+    return DeckGoesOn(self.z_m, cell_size_m_, [&](int dx, int dy) {
+      return padded_.Cell(cell + dy * kPaddedCells + dx);
     });
   }
 

@@ -19,7 +19,8 @@
 //   - Clearance: the underside of the next surface of the same cell is at least clearance_m above.
 //   - Undersides (kUnderside) are no ground and part of no plane. Where one is within max_step
 //     above the surface, or up to kMaxDeckM below it, a deck goes on whose top was not seen: ground
-//     below is no drop. Higher ones are bodies that block.
+//     below is no drop. Higher ones are bodies that block. Nor is it a drop through the few cells
+//     of a deck that no beam hit, from above or below (DeckGoesOn).
 // Traversable: all limits hold. Non-traversable: one does not, or a vertical patch has no plane
 // around it (a pole). Unknown: a horizontal patch with too few neighbours to fit a plane to.
 #ifndef STRATA_CORE_MLS_TRAVERSABILITY_H_
@@ -73,7 +74,7 @@ double Danger(double slope_rad,
               const TraversabilityLimits& limits);
 
 // One entry a surface, in order; that of an underside says just that. A pure function of the
-// surfaces (height, σ, depth) of the tile and of its neighbours within kPlaneRadiusCells of it.
+// surfaces (height, σ, depth) of the tile and of its neighbours.
 // REQUIRES: surfaces sorted and rows indexed.
 std::vector<SurfaceAssessment> AssessSurfaces(const SurfaceTile& tile,
                                               const SurfaceNeighbourhood& neighbours,

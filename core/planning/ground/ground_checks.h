@@ -10,12 +10,13 @@
 //   inferred  what was inferred there (core/world/things/inferred_tile.h), where that is asked for,
 //             rises above max_step and begins below z + height: ground or not
 // more than one of the last four at times. An underside is never ground, and no robot is on it:
-// within max_step of z, or up to kMaxDeckM below it, there is a deck whose top was not seen, a hole
-// that hides what lies under it. A hole is tolerated if along an axis or a diagonal through it no
-// more than max_gap is unobserved and it ends on both sides. Obstacles, drops (also those up to a
-// radius behind a hole) and holes that are not tolerated are *edges* seen from the surface; too
-// little clearance above it is an edge in its own cell, and so is what was inferred over ground.
-// Nobody stands on what was inferred, and it hides no hole: it adds edges and takes none away.
+// up to kUndersideRiseM above z, or up to kMaxDeckM below it, there is a deck whose top was not
+// seen, a hole that hides what lies under it; so are the few cells of a deck that no beam hit
+// (DeckGoesOn). A hole is tolerated if along an axis or a diagonal through it no more than max_gap
+// is unobserved and it ends on both sides. Obstacles, drops (also those up to a radius behind a
+// hole) and holes that are not tolerated are *edges* seen from the surface; too little clearance
+// above it is an edge in its own cell, and so is what was inferred over ground. Nobody stands on
+// what was inferred, and it hides no hole: it adds edges and takes none away.
 //
 // An edge concerns a robot of level z if the surface that it is seen from is nearer to z than all
 // else in that surface's cell and than the obstacle's or drop's own surface, and within the robot's
@@ -34,12 +35,17 @@
 #include <optional>
 #include <vector>
 
+#include "core/mls/local_plane.h"
 #include "core/planning/ground/ground_window.h"
 #include "core/planning/ground/profile_checks.h"
 #include "core/planning/ground/rows.h"
 #include "core/world/plan.h"
 
 namespace strata {
+
+// An underside that is higher above a robot than what noise and slopes explain is in its way,
+// whatever it climbs [m].
+inline constexpr float kUndersideRiseM = 0.1F;
 
 // A place where ground ends for robots whose level is within [z_low_m, z_high_m].
 struct GroundEdge {
@@ -154,7 +160,7 @@ inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
   for (std::uint32_t i = window_.begin(cell); i < window_.begin(cell + 1); ++i) {
     const WindowSurface& surface = window_.surface(i);
     const float dz = surface.z_m - z;
-    if (surface.underside() && dz >= -std::max(kMaxDeckM, rise_m) && dz <= rise_m) {
+    if (surface.underside() && dz >= -std::max(kMaxDeckM, rise_m) && dz <= kUndersideRiseM) {
       if (footing.ground == kNoSurface) footing = Footing();
       continue;
     }
@@ -170,6 +176,11 @@ inline Footing GroundChecks::Meet(int cell, float z, float rise_m) const {
     } else if (footing.above == kNoSurface) {
       footing.above = i;
     }
+  }
+  if (footing.below != kNoSurface && footing.ground == kNoSurface &&
+      window_.DeckIsUnseen(cell, z)) {
+    footing.below = kNoSurface;
+    footing.open = footing.above == kNoSurface;
   }
   if (window_.has_inferred()) footing.inferred = MeetInferred(cell, z, rise_m);
   return footing;

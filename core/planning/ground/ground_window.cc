@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
+#include <span>
 
+#include "core/mls/local_plane.h"
 #include "core/mls/surface_tile.h"
 #include "core/mls/tile_key.h"
 
@@ -18,11 +21,45 @@ GroundWindow::GroundWindow(const TileNeighbourhood& tiles,
   for (int y = 0; y < width_; ++y) AppendRow(tiles, y);
   // first_[c + 1] holds the count of cell c so far.
   for (int cell = 0; cell < cell_count(); ++cell) first_[cell + 1] += first_[cell];
+  FindUnseenDecks();
   if (std::all_of(inferred.begin(), inferred.end(), [](const auto& tile) { return !tile; })) return;
   first_inferred_.assign(first_.size(), 0);
   for (int y = 0; y < width_; ++y) AppendInferredRow(inferred, y);
   for (int cell = 0; cell < cell_count(); ++cell) {
     first_inferred_[cell + 1] += first_inferred_[cell];
+  }
+}
+
+// Every one has a top of its deck to the west or to the south. What lies below it as a deck is
+// thick is its underside.
+void GroundWindow::FindUnseenDecks() {
+  const auto column = [this](int cell) {
+    return std::span<const WindowSurface>(surfaces_.data() + first_[cell],
+                                          surfaces_.data() + first_[cell + 1]);
+  };
+  const auto look = [&](const WindowSurface& top, int step) {
+    for (int n = 1; n <= kMaxUnseenDeckCells; ++n) {
+      const int cell = static_cast<int>(top.cell) + n * step;
+      if (!Inside(cell, kMaxUnseenDeckCells)) return;
+      const bool goes_on = DeckGoesOn(
+          top.z_m, cell_size_m_, [&](int dx, int dy) { return column(cell + dy * width_ + dx); });
+      if (!goes_on) return;
+      if (!column(cell).empty()) unseen_decks_.emplace_back(cell, top.z_m);
+    }
+  };
+  float lowest_m = std::numeric_limits<float>::infinity();
+  for (const WindowSurface& surface : surfaces_) lowest_m = std::min(lowest_m, surface.z_m);
+  for (const WindowSurface& top : surfaces_) {
+    if (top.underside() || top.z_m - lowest_m < kLeastUnseenDropM) continue;
+    look(top, 1);
+    look(top, width_);
+  }
+  std::sort(unseen_decks_.begin(), unseen_decks_.end());
+  for (const auto& [cell, z_m] : unseen_decks_) {
+    for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+      const float below_m = z_m - surfaces_[i].z_m;
+      if (below_m >= kLeastUnseenDropM && below_m <= kMaxDeckM) surfaces_[i].weight = 0.0F;
+    }
   }
 }
 

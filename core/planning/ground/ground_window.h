@@ -3,9 +3,11 @@
 #ifndef STRATA_CORE_PLANNING_GROUND_GROUND_WINDOW_H_
 #define STRATA_CORE_PLANNING_GROUND_GROUND_WINDOW_H_
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/mls/local_plane.h"
@@ -56,6 +58,17 @@ class GroundWindow {
   std::uint32_t begin_inferred(int cell) const { return first_inferred_[cell]; }
   const InferredSpan& inferred(std::uint32_t i) const { return inferred_[i]; }
 
+  // True if a deck within kMaxUnseenDeckM of height z goes on in the cell though no beam hit it
+  // there, over a floor that others saw (DeckGoesOn). Its underside is marked as one.
+  bool DeckIsUnseen(int cell, float z) const {
+    constexpr auto kReach = static_cast<float>(kMaxUnseenDeckM);
+    if (unseen_decks_.empty()) return false;
+    const auto number = static_cast<std::uint32_t>(cell);
+    const auto deck =
+        std::lower_bound(unseen_decks_.begin(), unseen_decks_.end(), std::pair(number, z - kReach));
+    return deck != unseen_decks_.end() && deck->first == number && deck->second <= z + kReach;
+  }
+
   int CellOfTile(std::uint16_t cell_in_tile) const {
     return ((cell_in_tile >> kTileShift) + margin_) * width_ + (cell_in_tile & (kTileCells - 1)) +
            margin_;
@@ -70,6 +83,7 @@ class GroundWindow {
  private:
   void AppendRow(const TileNeighbourhood& tiles, int y);
   void AppendInferredRow(const InferredNeighbourhood& tiles, int y);
+  void FindUnseenDecks();
 
   double cell_size_m_;
   int margin_;
@@ -78,6 +92,7 @@ class GroundWindow {
   std::vector<std::uint32_t> first_;
   std::vector<InferredSpan> inferred_;  // InferredSpan::cell is not that of the window
   std::vector<std::uint32_t> first_inferred_;
+  std::vector<std::pair<std::uint32_t, float>> unseen_decks_;  // cell, height; in order
 };
 
 }  // namespace strata

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/mls/local_plane.h"
 #include "core/mls/tile_key.h"
 #include "core/mls/traversability.h"
 #include "core/planning/ground/ground_fit.h"
@@ -79,8 +80,8 @@ absl::StatusOr<ProfileChecks> MakeProfileChecks(const RobotProfile& profile, dou
   checks.sight_cells = std::max(checks.gap_cells[0], checks.behind_cells[0]) + 2;
   // Targets of moves, the disc around them, the surfaces that see its edges, what those see.
   const double disc_cells = checks.reach_m / cell_size_m + 1.5;
-  const double cells =
-      checks.gap_cells[0] + 1 + disc_cells + checks.behind_cells[0] + 1 + checks.sight_cells;
+  const int seen_cells = checks.behind_cells[0] + 1 + checks.sight_cells + kMaxUnseenDeckCells;
+  const double cells = checks.gap_cells[0] + 1 + disc_cells + seen_cells;
   if (cells > kTileCells - 1) {
     return absl::InvalidArgumentError(absl::StrCat("radius_m = ",
                                                    profile.radius_m,
@@ -95,8 +96,7 @@ absl::StatusOr<ProfileChecks> MakeProfileChecks(const RobotProfile& profile, dou
                                                    " are checked"));
   }
   FillDisc(&checks);
-  checks.margin =
-      checks.gap_cells[0] + 1 + checks.disc_cells + checks.behind_cells[0] + 1 + checks.sight_cells;
+  checks.margin = checks.gap_cells[0] + 1 + checks.disc_cells + seen_cells;
   return checks;
 }
 

@@ -250,8 +250,30 @@ TEST(TraversabilityTest, UndersidesAreNoGroundAndHideTheDropThroughTheirDeck) {
     }
   }
   // Nobody takes a deck of 1.5 m for what goes on: something may lie on it, and one may fall.
-  const SurfaceWorld thick = Annotated(SparseDeck(2.0, 3.5));
-  EXPECT_EQ(SurfaceAt(thick, {129, 129}, 1).traversability, kNo);
+  const SurfaceWorld thick = Annotated([](CellIndex cell) {
+    if (cell.x < 128) return std::vector<Level>{{.z_m = 0.0}, {.z_m = 3.5, .depth_m = 1.5}};
+    return std::vector<Level>{{.z_m = 0.0}, {.z_m = 2.0, .underside = true}};
+  });
+  EXPECT_EQ(SurfaceAt(thick, {127, 129}, 1).traversability, kNo);
+  EXPECT_EQ(SurfaceAt(thick, {126, 129}, 1).traversability, kYes);
+}
+
+TEST(TraversabilityTest, CellsOfADeckThatNoBeamHitAreNoDrop) {
+  const auto beside = [](int width, int length, double floor_m) {
+    const SurfaceWorld world = Annotated([=](CellIndex cell) {
+      std::vector<Level> levels = {{.z_m = floor_m}};
+      const bool unseen = cell.x >= 128 && cell.x < 128 + width && cell.y >= 128 - length / 2 &&
+                          cell.y < 128 + (length + 1) / 2;
+      if (!unseen) levels.push_back({.z_m = 3.0});
+      return levels;
+    });
+    return SurfaceAt(world, {127, 128}, 1).traversability;
+  };
+  for (const int width : {1, 2}) EXPECT_EQ(beside(width, 99, 0.0), kYes) << width;  // rings
+  EXPECT_EQ(beside(9, 2, 0.0), kYes);
+  EXPECT_EQ(beside(3, 3, 0.0), kNo);
+  EXPECT_EQ(beside(2, 99, 2.6), kYes);  // the underside, which nobody knew to be one
+  EXPECT_EQ(beside(1, 1, 2.8), kNo);    // a ditch
 }
 
 TEST(TraversabilityTest, ALowUndersideBlocksTheGroundBelowAndBesideIt) {

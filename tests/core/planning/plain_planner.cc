@@ -46,6 +46,13 @@ PlainPlanner::PlainPlanner(const DrawnMap& map, const RobotProfile& profile, dou
                           {}});
     }
   }
+  std::vector<Patch*> undersides;
+  for (Patch& patch : patches_) {
+    for (const double deck : UnseenDecks(patch.cell)) {
+      if (patch.z <= deck - 0.25 && patch.z >= deck - 1.0) undersides.push_back(&patch);
+    }
+  }
+  for (Patch* patch : undersides) patch->underside = true;
   for (std::size_t i = 0; i < patches_.size(); ++i) {
     if (!patches_[i].underside) FindEdges(static_cast<int>(i));
   }
@@ -68,7 +75,7 @@ PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise) 
   if (column == columns_.end()) return meeting;
   // The top of a deck that was seen from below only could be where the robot is.
   const auto may_be_deck = [&](const Patch& patch) {
-    return patch.underside && patch.z <= z + rise && patch.z >= z - std::max(rise, 1.0);
+    return patch.underside && patch.z <= z + 0.1F && patch.z >= z - std::max(rise, 1.0);
   };
   const bool grounded = std::any_of(column->second.begin(), column->second.end(), [&](int i) {
     return !patches_[i].underside && std::abs(patches_[i].z - z) <= rise;
@@ -93,7 +100,67 @@ PlainPlanner::Meeting PlainPlanner::Meet(CellIndex cell, double z, double rise) 
       meeting.drop = i;
     }
   }
+  const std::vector<double> decks =
+      meeting.drop >= 0 && meeting.ground < 0 ? UnseenDecks(cell) : std::vector<double>();
+  if (std::any_of(
+          decks.begin(), decks.end(), [z](double deck) { return std::abs(deck - z) <= 0.2; })) {
+    meeting.drop = -1;
+    meeting.hole = meeting.obstacle < 0;
+  }
   return meeting;
+}
+
+bool PlainPlanner::IsHoleInDeck(CellIndex cell, double z) const {
+  // 'o' a hole, 't' a top, 'b' something else.
+  const auto look = [&](int dx, int dy) {
+    char seen = 'o';
+    const auto column = columns_.find({cell.x + dx, cell.y + dy});
+    if (column == columns_.end()) return seen;
+    for (const int i : column->second) {
+      const Patch& patch = patches_[i];
+      if (patch.underside) continue;
+      if (static_cast<float>(std::abs(patch.z - z)) <=
+          static_cast<float>(std::hypot(dx, dy) * cell_size_)) {
+        return 't';
+      }
+      if (patch.z > z - 0.25 && patch.bottom <= z + 1.0) seen = 'b';
+    }
+    return seen;
+  };
+  if (look(0, 0) != 'o') return false;
+  const int limit = std::min(4, static_cast<int>(0.2 / cell_size_ + 1e-6));
+  for (const bool along_x : {true, false}) {
+    int holes = 1;
+    bool ends = true;
+    for (const int sign : {1, -1}) {
+      const auto at = [&](int n) { return look(along_x ? sign * n : 0, along_x ? 0 : sign * n); };
+      int n = 1;
+      while (n <= limit && at(n) == 'o') ++n;
+      ends = ends && at(n) == 't';
+      holes += n - 1;
+    }
+    if (ends && holes <= limit) return true;
+  }
+  return false;
+}
+
+std::vector<double> PlainPlanner::UnseenDecks(CellIndex cell) const {
+  std::vector<double> decks;
+  for (int n = 1; n <= 4; ++n) {
+    for (const CellIndex step : {CellIndex{1, 0}, CellIndex{0, 1}}) {
+      const auto before = columns_.find({cell.x - n * step.x, cell.y - n * step.y});
+      if (before == columns_.end()) continue;
+      for (const int i : before->second) {
+        const Patch& top = patches_[i];
+        bool all = !top.underside;
+        for (int m = 0; m < n; ++m) {
+          all = all && IsHoleInDeck({cell.x - m * step.x, cell.y - m * step.y}, top.z);
+        }
+        if (all) decks.push_back(top.z);
+      }
+    }
+  }
+  return decks;
 }
 
 // Holes from `hole` on, itself included; 999 if the row does not end within max_gap.

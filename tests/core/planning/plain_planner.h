@@ -52,6 +52,10 @@ class PlainPlanner {
     bool Nothing() const { return ground < 0 && obstacle < 0 && drop < 0; }
   };
   Meeting Meet(CellIndex cell, double z, double rise) const;
+  // Ends on both sides, along an axis, at tops of height z, within 0.2 m.
+  bool IsHoleInDeck(CellIndex cell, double z) const;
+  // Heights of decks that no beam hit there.
+  std::vector<double> UnseenDecks(CellIndex cell) const;
   // The highest place to stand of the endpoint's cell on which the robot reaches z.
   int PlaceOnFloor(const PlanEndpoint& endpoint) const;
   bool Concerns(const Edge& edge, double z) const;

@@ -39,7 +39,8 @@ struct World {
 };
 
 // Rolling ground with noise, kerbs, walls, poles, holes, a platform over part of it and a ramp up
-// to it, across tile borders of either sign. Of some of the platform the underside was seen alone.
+// to it, across tile borders of either sign. Of some of the platform the underside was seen alone,
+// of single cells and pairs of it nothing.
 World RandomWorld(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, 0.008);
@@ -75,12 +76,17 @@ World RandomWorld(std::uint64_t seed) {
   }
   const double deck = uniform(0.9, 1.6);  // sometimes too low to pass under
   std::mt19937_64 sight(seed);
+  std::mt19937_64 misses(~seed);
   const int ceiling_from = 15 + static_cast<int>(sight() % 40);  // of the platform, by its column
   for (int y = 20; y < 20 + 14; ++y) {
     for (int x = 15; x < 35; ++x) {
       at(x, y).push_back({deck + noise(random), 0.2});
-      if (x < ceiling_from && sight() % 8 != 0) continue;
-      at(x, y).back() = {deck - 0.2 + 0.01 * static_cast<double>(sight() % 4), 0.0, 0.01, true};
+      if (x >= ceiling_from || sight() % 8 == 0) {
+        at(x, y).back() = {deck - 0.2 + 0.01 * static_cast<double>(sight() % 4), 0.0, 0.01, true};
+      }
+      const std::uint64_t miss = misses() % 12;
+      if (miss == 0) at(x, y).pop_back();
+      if (miss == 1) at(x, y).back() = {deck - 0.3};  // its underside, which nobody knows to be one
     }
     const int run = static_cast<int>(deck / 0.03);
     for (int i = 0; i < run && 35 + i < kWidth; ++i) at(35 + i, y) = {{deck - 0.03 * (i + 1), 0.3}};

@@ -1,7 +1,10 @@
-// What was seen from below alone: no ground, and no drop beneath it.
+// What was seen from below alone, and what no beam hit: no ground, and no drop beneath it.
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/mls/tile_key.h"
 #include "core/world/plan.h"
 #include "tests/core/planning/small_robot.h"
 #include "tests/support/drawing.h"
@@ -45,6 +48,43 @@ TEST(UndersideTest, AStripOfWhichOnlyTheUndersideWasSeenIsAGapAndNoDrop) {
   const PlanResult onto = PlanIn(deck(4, true), from, At(4.15, 1.05, 2.7));
   EXPECT_EQ(onto.reason, PlanReason::kFound) << onto.message;
   EXPECT_NEAR(onto.waypoints.back().z(), 3.0, 1e-6);
+}
+
+// A deck of 3 m over a road, as long as one likes, of which nobody has seen some cells.
+DrawnMap DeckWithout(const std::vector<CellIndex>& unseen, double road_m = 0.0) {
+  DrawnMap map = MapFromDrawing("........\n........", {{'.', {{road_m}, {3.0, 0.3}}}}, 10);
+  for (const CellIndex cell : unseen) map[cell] = {{road_m}};
+  return map;
+}
+
+TEST(UndersideTest, CellsOfADeckThatNoBeamHitAreAGapAndNoDrop) {
+  const PlanEndpoint from = At(1.05, 1.05, 3.0);
+  const PlanEndpoint to = At(7.05, 1.05, 3.0);
+  // All over the deck, so that there is no way between them.
+  std::vector<CellIndex> sparse;
+  for (int y = 1; y < 19; y += 2) {
+    for (int x = 31; x < 60; x += 2) sparse.push_back({x, y});
+  }
+  const PlanResult over = PlanIn(DeckWithout(sparse), from, to);
+  EXPECT_TRUE(over.found()) << over.message;
+  EXPECT_NEAR(over.cost, 6.0, 0.5);
+  // Nor is its underside ground that a step leads to, where nobody knew it for one.
+  DrawnMap undersides = DeckWithout(sparse);
+  for (const CellIndex cell : sparse) undersides[cell].push_back({.z_m = 2.7});
+  EXPECT_NEAR(PlanIn(undersides, from, to).cost, over.cost, 1e-6);
+  // What lies only a little lower may have been seen from above.
+  const PlanResult ditch = PlanIn(DeckWithout(sparse, 2.8), from, to);
+  EXPECT_EQ(ditch.obstruction, Obstruction::kDrop) << ditch.message;
+  // What lies between rings may be long, but not wider.
+  std::vector<CellIndex> narrow;
+  std::vector<CellIndex> broad;
+  for (int y = 0; y < 20; ++y) {
+    narrow.insert(narrow.end(), {{40, y}, {41, y}});
+    broad.insert(broad.end(), {{40, y}, {41, y}, {42, y}});
+  }
+  EXPECT_TRUE(PlanIn(DeckWithout(narrow), from, to).found());
+  const PlanResult wide = PlanIn(DeckWithout(broad), from, to);
+  EXPECT_EQ(wide.obstruction, Obstruction::kDrop) << wide.message;
 }
 
 TEST(UndersideTest, NobodyStandsOnAnUndersideAmongTopsThatAStepWouldReach) {
