@@ -154,18 +154,29 @@ ViewGain ExpectedViews::Look(const Pose& T_map_sensor, const Beams& beams) {
       const bool unknown = odds == OccupancyVoxels::kUnknownOdds;
       const bool open = mark.open > 0 && along.z() < 0.0;
       const bool hit = unknown ? open : odds > 0 && !Passes(at, from, along, passed);
-      if (mark.view != kTaken && mark.view != view_ && counted_.Contains(at)) {
+      const bool counts = mark.view != kTaken && counted_.Contains(at);
+      const auto weight = [&](double voxels_per_length) {
+        return beams.each == 1.0 ? 1.0 : WeightAt(beams, beam, voxels_per_length, range_m);
+      };
+      if (counts && mark.view != view_) {
         const std::size_t number = (unknown ? 0 : odds) - least_odds_;
-        const double weight =
-            beams.each == 1.0 ? 1.0 : WeightAt(beams, beam, direction.lpNorm<1>(), range_m);
         const double worth = unknown && IsUnderFree(at) ? ground_weight_ : 1.0;
-        gain.bits += worth * weight * (hit ? gain_of_hit_ : gain_of_miss_)[number];
-        if (hit && open && !unknown) {
-          gain.bits += ground_weight_ * weight * mark.open * gain_of_hit_[-least_odds_];
-        }
-        if (unknown) gain.volume_m3 += weight * std::pow(voxel_m, 3);
+        const double voxels = weight(direction.lpNorm<1>());
+        gain.bits += worth * voxels * (hit ? gain_of_hit_ : gain_of_miss_)[number];
+        if (unknown) gain.volume_m3 += voxels * std::pow(voxel_m, 3);
       }
-      if (mark.view != kTaken) mark.view = view_;
+      if (mark.view != kTaken && mark.view != view_) {
+        mark.view = view_;
+        mark.ended = 0;
+      }
+      if (counts && hit && open && mark.ended < 255) {
+        // Each beam shows one place more; they end in as many voxels as the level ground that they
+        // cover has.
+        const double left = weight(-direction.z()) * mark.open - mark.ended * beams.each;
+        gain.bits +=
+            ground_weight_ * std::clamp(left, 0.0, beams.each) * gain_of_hit_[-least_odds_];
+        ++mark.ended;
+      }
       return !hit;
     });
   }

@@ -39,8 +39,8 @@ class ExpectedViews {
                 const Eigen::AlignedBox3d& region = OccupancyVoxelsOptions().region,
                 double ground_weight = 1.0);
 
-  // A surface there was seen too sparsely: to a beam that ends in its voxel from above it is one
-  // more voxel of unknown ground.
+  // A surface there was seen too sparsely: to one of the beams that end in its voxel from above it
+  // is one more voxel of unknown ground, to no beam more than one.
   void AddOpenGround(const Eigen::Vector3d& place);
 
   // From kMostEstimateBeams at most; the voxels of each stand for those that the beams around it
@@ -58,6 +58,7 @@ class ExpectedViews {
   struct Mark {
     std::uint16_t view = 0;  // that looked last, or kTaken
     std::uint8_t open = 0;   // places with open ground
+    std::uint8_t ended = 0;  // beams of the view that looked last, where there are such
   };
   struct Beams {
     std::vector<Eigen::Vector3d> directions;

@@ -36,6 +36,7 @@ class GroundFlood {
 
   std::vector<Vector3d> Run(const std::vector<PatchId>& reached) {
     for (const PatchId patch : reached) Mark(patch);
+    beyond_.resize(marked_.size());
     for (const PatchId patch : reached) LookAround(patch);
     for (std::size_t i = 0; i < queue_.size(); ++i) LookAround(queue_[i]);
     open_.erase(std::remove_if(open_.begin(),
@@ -47,10 +48,30 @@ class GroundFlood {
                                      });
                                }),
                 open_.end());
+    const std::size_t holes = open_.size();
+    for (std::size_t i = 0; i < holes; ++i) AddAround(open_[i]);
     return open_;
   }
 
  private:
+  // What nothing but a hole keeps the robot from, as far as anybody knows: patches that were not
+  // reached, of which it would cover the hole.
+  void AddAround(Vector3d hole) {
+    const auto cell_of = [this](double x) {
+      return static_cast<std::int32_t>(std::floor(x / checks_.cell_size_m));
+    };
+    const CellIndex middle = {cell_of(hole.x()), cell_of(hole.y())};
+    for (const DiscCell& at : checks_.disc) {
+      if (at.distance_m > checks_.footprint_m) break;
+      for (const PatchId patch : space_.FindCell({middle.x + at.dx, middle.y + at.dy})) {
+        if (patch >= beyond_.size() || !beyond_[patch]) continue;
+        if (std::abs(space_.Height(patch) - hole.z()) > at.level_m) continue;
+        beyond_[patch] = false;
+        open_.push_back(space_.Position(patch));
+      }
+    }
+  }
+
   // True the first time.
   bool Mark(PatchId patch) {
     if (patch >= marked_.size()) marked_.resize(space_.end());
@@ -87,7 +108,11 @@ class GroundFlood {
       next = patch;
     }
     if (next != kNoPatchId) {
-      if (Mark(next)) queue_.push_back(next);
+      if (Mark(next)) {
+        queue_.push_back(next);
+        if (next >= beyond_.size()) beyond_.resize(space_.end());
+        beyond_[next] = true;
+      }
       return false;
     }
     if (IsFree(at, 0.5) && IsFree(at, -0.5)) return false;  // a drop
@@ -136,6 +161,7 @@ class GroundFlood {
   const FieldOfView& sensor_;
   std::vector<bool> marked_;    // by patch: reached, or in queue_
   std::vector<PatchId> queue_;  // of what ground goes on to
+  std::vector<bool> beyond_;    // by patch: of queue_, and not in open_
   HashSet<BlockKey> known_;     // open_ by cell and level
   std::vector<Vector3d> open_;
 };

@@ -12,11 +12,12 @@
 
 namespace strata {
 
-// Cells without a surface beside ground that goes on, step by step, from the patches `reached`,
-// where the robot can stand or not: middles, at the height of that ground. Only where voxels say
-// that there is air above and that no ray went through the ground, and not where a look by `sensor`
-// had a beam for every cell and nothing in the way: no other would find more. Each cell once a
-// level.
+// Ground that a robot could be on if it had been seen whole: cells without a surface beside ground
+// that goes on, step by step, from the patches `reached`, where the robot can stand or not, and the
+// patches of that ground that were not reached and from which its disc covers such a cell. Middles,
+// at the height of that ground. Only where voxels say that there is air above and that no ray went
+// through the ground, and not around cells that a look by `sensor` had a beam for, with nothing in
+// the way: no other would find more. Each cell once a level.
 std::vector<Eigen::Vector3d> OpenGround(SearchSpace& space,
                                         const std::vector<PatchId>& reached,
                                         const SeenSpace& seen,

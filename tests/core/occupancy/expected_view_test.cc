@@ -162,6 +162,35 @@ TEST(ExpectedViewTest, OpenGroundIsWorthAVoxelOfGroundUntilItIsTaken) {
   EXPECT_EQ(from_below.Follow(pose).bits, before);
 }
 
+// Far away few beams end where there are many such places.
+TEST(ExpectedViewTest, ABeamShowsOnePlaceOfOpenGround) {
+  const OccupancyVoxels grid = SeenHall(InverseSensorModel::OfOneLook());
+  const Pose pose = At(2.03, 4.07);
+  const auto bits_with = [&](int places) {
+    ExpectedViews views(grid, Sensor(), OccupancyVoxelsOptions().region, 10.0);
+    for (int i = 0; i < places; ++i) {
+      for (const double x : {4.95, 5.15, 5.35}) views.AddOpenGround({x, 4.07, -0.1});
+    }
+    return views.Follow(pose).bits;
+  };
+  const double each = 10.0 * InformationGainBits(0.5, InverseSensorModel::OfOneLook().most);
+  EXPECT_GT(bits_with(1), bits_with(0) + 0.99 * each);
+  EXPECT_LT(bits_with(200), bits_with(0) + 60.0 * each);
+}
+
+TEST(ExpectedViewTest, SomeBeamsSayOfOpenGroundWhatAllDo) {
+  const OccupancyVoxels grid = SeenHall(InverseSensorModel::OfOneLook());
+  ExpectedViews views(grid, Sensor(), OccupancyVoxelsOptions().region, 10.0);
+  for (double x = 0.05; x < 6.0; x += 0.1) {
+    for (double y = 0.05; y < 8.0; y += 0.1) views.AddOpenGround({x, y, -0.1});
+  }
+  for (const Pose& pose : {At(2.03, 4.07), At(1.01, 1.53, 0.3), At(4.07, 6.33, 2.0)}) {
+    const double all = views.Follow(pose).bits;
+    EXPECT_GT(all, 5000.0);
+    EXPECT_NEAR(views.Estimate(pose).bits, all, 0.2 * all);
+  }
+}
+
 // More views than the 16 bits that tell one from the next.
 TEST(ExpectedViewTest, ViewsAreToldApartHoweverManyThereAre) {
   OccupancyVoxelsOptions options;

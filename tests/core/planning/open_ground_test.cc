@@ -83,6 +83,16 @@ TEST(OpenGroundTest, CellsBetweenSurfacesThatBeamsDrewAreOpen) {
   }
 }
 
+// The robot cannot stand there for the cells between them.
+TEST(OpenGroundTest, SurfacesBesideOpenCellsAreOpenToo) {
+  int surfaces = 0;
+  for (const Vector3d& place : OpenAround(6.2, {}, 32)) {
+    const Eigen::Vector2i cell = (place.head<2>() / kCell).array().floor().cast<int>();
+    if (cell.x() < 60 && cell.x() % 3 == 0 && cell.y() % 3 == 0) ++surfaces;
+  }
+  EXPECT_GT(surfaces, 40);  // of 98
+}
+
 // Where rays went to the floor below there is no ground, and nothing to look at.
 TEST(OpenGroundTest, WhereRaysWentThroughIsADrop) {
   for (const Vector3d& place : OpenAround(4.2, {}, 32)) EXPECT_LT(place.x(), 4.6);
