@@ -55,12 +55,6 @@ struct WaitingMap {
   bool deletion = false;    // of the map (EditKind::kDeleteMap)
 };
 
-// A server that lives, on the same store.
-struct LiveServer {
-  std::string holder;  // which it is, however often it is started
-  bool works = false;  // it runs jobs of maps that others have
-};
-
 // A parameter that no kind has, set on a job as it is stored while a server runs it that has not
 // got the map: "HOLDER/TOKEN", by which the server's commits are told from those of one that has
 // lost it.

@@ -187,10 +187,7 @@ absl::StatusOr<bool> JobsElsewhere::RunNext() {
   STRATA_ASSIGN_OR_RETURN(const std::vector<UnfinishedJob> jobs, stores_.ListUnfinishedJobs());
   std::set<std::string> alive;
   if (std::ranges::any_of(jobs, [](const UnfinishedJob& job) { return !job.run_by.empty(); })) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<LiveServer> servers, stores_.ListServers());
-    for (const LiveServer& server : servers) {
-      if (server.works) alive.insert(server.holder);
-    }
+    STRATA_ASSIGN_OR_RETURN(alive, stores_.ListWorkers());
   }
   alive.erase(holder_);  // it runs none now: what says so is of an earlier life
   for (const UnfinishedJob& job : jobs) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -357,17 +358,17 @@ absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
   return waiting;
 }
 
-absl::StatusOr<std::vector<LiveServer>> PostgresMaps::ListServers() const {
+absl::StatusOr<std::set<std::string>> PostgresMaps::ListWorkers() const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
       lease->Query("SELECT holder, roles FROM map_server WHERE expires > clock_timestamp()"));
-  std::vector<LiveServer> servers;
+  std::set<std::string> workers;
   while (row.Next()) {
     const std::vector<std::string> roles = absl::StrSplit(row.Text(1), ',');
-    servers.push_back({row.Text(0), absl::c_linear_search(roles, kWorkerRole)});
+    if (absl::c_linear_search(roles, kWorkerRole)) workers.insert(row.Text(0));
   }
-  return servers;
+  return workers;
 }
 
 absl::StatusOr<std::vector<UnfinishedJob>> PostgresMaps::ListUnfinishedJobs() const {
