@@ -239,6 +239,7 @@ absl::Status JobsElsewhere::Compute(const UnfinishedJob& job,
                                     const std::string& run_by,
                                     const Stop& stop,
                                     JobResult& result) {
+  if (IsToldToEnd(taken)) return absl::CancelledError("it was cancelled before it was run here");
   STRATA_ASSIGN_OR_RETURN(StoredMap stored, stores_.OpenToWork(job.map, job.id, run_by));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<MapCore> core,
                           MapCore::OpenBeside(job.map, std::move(stored), options_, caches_));

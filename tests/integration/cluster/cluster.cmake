@@ -45,16 +45,17 @@ add_dependencies(edits_elsewhere_test stratad)
 add_test(NAME edits_elsewhere_test COMMAND edits_elsewhere_test)
 set_tests_properties(edits_elsewhere_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
 
-# Servers that take maps and servers that do not; and maps that are deleted by those that have not got them.
+# Servers that take maps and servers that do not, and those that run jobs of others' maps; and maps that are deleted by servers that
+# have not got them.
 strata_executable(
   roles_test roles_test
-  SOURCES stratad_process.cc cluster/roles_test.cc
+  SOURCES stratad_process.cc cluster/roles_test.cc cluster/workers_test.cc
   DEPS strata::postgres_cluster strata::sdk strata::storage_postgresql strata::test_support GTest::gmock_main
   SHARED_HEADERS strata_test_headers
 )
 add_dependencies(roles_test stratad)
 add_test(NAME roles_test COMMAND roles_test)
-set_tests_properties(roles_test PROPERTIES LABELS integration TIMEOUT 300 COST 300)
+set_tests_properties(roles_test PROPERTIES LABELS integration TIMEOUT 600 COST 300)
 
 # Watches by the server that has not got the map.
 strata_executable(
