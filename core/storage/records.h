@@ -104,7 +104,8 @@ enum class EditKind : std::uint8_t {  // stored
   kSetLabels = 3,
   kUpdateLabels = 4,  // those that are 0 leave what people said
   kSetDefaultProfile = 5,
-  kDeleteMap = 6,  // which is no work of its worker's: WaitingMap::deletion
+  kDeleteMap = 6,     // which is no work of its worker's: WaitingMap::deletion
+  kTellInferred = 7,  // its watchers, that what is inferred is another: a job beside it has kept it
 };
 
 // An edit that is asked for where another process has the map.

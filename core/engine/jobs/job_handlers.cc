@@ -126,8 +126,8 @@ const std::vector<JobHandler>& JobHandlers() {
       {kEvaluateJob, NeedsClassifier, RunEvaluate, /*anywhere=*/true},
       {kFadeJob, NeedsPoints, RunFade},
       {kPlanesJob, NeedsPoints, RunPlanes, /*anywhere=*/true},
-      {kObjectsJob, NeedsPointsAndClass, RunObjects},
-      {kCompleteJob, NeedsPoints, RunComplete},
+      {kObjectsJob, NeedsPointsAndClass, RunObjects, /*anywhere=*/true},
+      {kCompleteJob, NeedsPoints, RunComplete, /*anywhere=*/true},
   };
   return *handlers;
 }

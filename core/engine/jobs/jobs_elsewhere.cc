@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
@@ -33,6 +34,9 @@ namespace {
 constexpr absl::Duration kProgressInterval = absl::Seconds(2);
 constexpr absl::Duration kLookInterval = absl::Seconds(1);
 constexpr absl::Duration kClosingPoll = absl::Milliseconds(100);
+// So long a job that has published waits for who has the map.
+constexpr absl::Duration kLongestTelling = absl::Seconds(10);
+constexpr absl::Duration kTellingPoll = absl::Milliseconds(20);
 
 std::string NewRunBy(const std::string& holder) {
   absl::BitGen random;
@@ -144,6 +148,32 @@ class RunWatch {
   std::thread thread_;
 };
 
+// Whoever sees that the job has ended is shown what it published, wherever he asks: so it ends when
+// who has the map has told of that. Where nobody has it, or is busy, it is told later.
+void AwaitTold(MapCore& core, const Stop& stop) {
+  const std::uint64_t asked = core.asked_to_tell();
+  const absl::Time end = SteadyNow() + kLongestTelling;
+  const auto is_told = [&]() -> absl::StatusOr<bool> {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(const std::optional<absl::Status> told, reader->FindAnswer(asked));
+    return told.has_value();
+  };
+  while (asked > 0 && SteadyNow() < end && !stop.requested()) {
+    const absl::StatusOr<bool> told = is_told();
+    if (!told.ok()) return;
+    if (*told) {
+      core.writer()
+          .Run(Durability::kRelaxed,
+               0,
+               stop,
+               [asked](StorageWriter& writer) { return writer.ForgetEdit(asked); })
+          .IgnoreError();  // who asks next does, an hour later
+      return;
+    }
+    absl::SleepFor(kTellingPoll);
+  }
+}
+
 }  // namespace
 
 JobsElsewhere::JobsElsewhere(const EngineOptions& options,
@@ -245,7 +275,9 @@ absl::Status JobsElsewhere::Compute(const UnfinishedJob& job,
                           MapCore::OpenBeside(job.map, std::move(stored), options_, caches_));
   BesideContext context(*core, job.id, stop, closing_, result);
   const RunWatch watch(*core, job.id, run_by, stop, closing_);
-  return RunHandler(*core, nullptr, taken, context);
+  STRATA_RETURN_IF_ERROR(RunHandler(*core, nullptr, taken, context));
+  AwaitTold(*core, stop);
+  return absl::OkStatus();
 }
 
 absl::Status JobsElsewhere::Run(const UnfinishedJob& job,

@@ -9,8 +9,8 @@ add_dependencies(two_servers_test stratad)
 add_test(NAME two_servers_test COMMAND two_servers_test)
 set_tests_properties(two_servers_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
-# The conformance suite by a gateway. Uploads that begin there do not go on where they broke, and tiles of earlier epochs are
-# the owner's.
+# The conformance suite by a server without the map that works for its owner. Uploads that begin there do not go on where they
+# broke, and tiles of earlier epochs are the owner's. Then what is about jobs by the owner.
 strata_executable(
   beside_suite_test beside_suite_test
   SOURCES cluster/beside_suite_test.cc
@@ -19,9 +19,14 @@ strata_executable(
 )
 add_test(
   NAME beside_suite_test
-  COMMAND beside_suite_test --gtest_filter=-*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*:*AnEarlierEpochHasTheTilesOfItsPoses*
+  COMMAND beside_suite_test --gtest_filter=-TheOwner/*:*AnAnnouncedUploadGoesOnWhereItBroke*:*TheLaterOfTwoUploadsOfAnAnnouncedScanTakesOver*:*AnEarlierEpochHasTheTilesOfItsPoses*
 )
 set_tests_properties(beside_suite_test PROPERTIES LABELS integration TIMEOUT 2400 COST 600)
+add_test(
+  NAME worked_suite_test
+  COMMAND beside_suite_test --gtest_filter=TheOwner/*Job*:TheOwner/*Kind*:TheOwner/*Thing*:TheOwner/*Infer*:TheOwner/*Plane*:TheOwner/*Propos*:TheOwner/*DryRun*:TheOwner/*Epoch*:TheOwner/*Watch*
+)
+set_tests_properties(worked_suite_test PROPERTIES LABELS integration TIMEOUT 1200 COST 300)
 
 # Plans by the server that has not got the map.
 strata_executable(

@@ -28,6 +28,8 @@
 
 namespace strata::testing {
 
+inline constexpr std::uint16_t kThing = 2;
+
 inline api::Call Within(absl::Duration patience) {
   api::Call call;
   call.stop = Stop(SteadyNow() + patience);

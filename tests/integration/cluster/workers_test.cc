@@ -25,6 +25,45 @@ using ::testing::HasSubstr;
 
 class WorkersTest : public RolesTest {};
 
+// A block as of a kind that a map has twice, which nobody saw from above.
+PointCloud BlockAt(float x_m) {
+  PointCloud cloud;
+  for (int i = 0; i <= 16; ++i) {
+    for (int k = 2; k <= 20; ++k) {
+      const float along = 0.05F * static_cast<float>(i);
+      const float z = 0.05F * static_cast<float>(k);
+      cloud.points.emplace_back(x_m + along, 0.0F, z);
+      cloud.points.emplace_back(x_m + along, 0.6F, z);
+      if (i > 12) continue;
+      cloud.points.emplace_back(x_m, along, z);
+      cloud.points.emplace_back(x_m + 0.8F, along, z);
+    }
+  }
+  cloud.label.assign(cloud.size(), kThing);
+  return cloud;
+}
+
+absl::Status PutBlock(api::Database& db, std::uint64_t sequence) {
+  const PointCloud cloud = BlockAt(3.0F * static_cast<float>(sequence));
+  STRATA_ASSIGN_OR_RETURN(const auto upload,
+                          db.scans().Upload({}, kShared, NumberedHeader(sequence, cloud)));
+  STRATA_RETURN_IF_ERROR(upload->Write(cloud));
+  return upload->Finish().status();
+}
+
+// What one is told who was told `since` before, at once.
+api::MapUpdate Since(api::Database& db, std::uint64_t since) {
+  api::WatchOptions options;
+  options.since = since;
+  options.once = true;
+  api::MapUpdate told;
+  STRATA_EXPECT_OK(db.maps().Watch({}, kShared, options, [&](const api::MapUpdate& update) {
+    told = update;
+    return absl::OkStatus();
+  }));
+  return told;
+}
+
 // Of a map that another server has.
 TEST_F(WorkersTest, JobsAreRunByWorkers) {
   STRATA_ASSERT_OK(db(0).maps().Create({}, kShared, MapParameters()));
@@ -51,6 +90,45 @@ TEST_F(WorkersTest, JobsAreRunByWorkers) {
   STRATA_EXPECT_OK(RunJobOf(db(2), "verify"));
   EXPECT_EQ(Owner(), "b");
   EXPECT_EQ(RunBy(), "");
+}
+
+// Once the job has ended, by every server: also where the owner had a later number by then.
+TEST_F(WorkersTest, WhatAWorkerInfersIsToldByAll) {
+  STRATA_ASSERT_OK(db(0).maps().Create({}, kShared, MapParameters()));
+  Add("b", "integrator");
+  Add("c", "worker");
+  for (const std::uint64_t scan : {1, 2}) STRATA_ASSERT_OK(PutBlock(db(0), scan));
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  STRATA_ASSERT_OK(RunJobOf(db(0), "objects"));
+  for (int round = 1; round <= 2; ++round) {
+    const std::uint64_t before = Since(db(1), 0).commit_sequence;
+    std::thread robot([&] {
+      for (std::uint64_t scan = 1; scan <= 5; ++scan) {
+        STRATA_EXPECT_OK(PutNumbered(*servers_[0]->db(), kShared, 10 * (round + 1) + scan));
+        absl::SleepFor(absl::Milliseconds(200));
+      }
+    });
+    STRATA_EXPECT_OK(RunJobOf(db(0), "complete"));
+    for (const std::size_t server : {1U, 0U, 2U}) {
+      EXPECT_TRUE(Since(db(server), before).inferred) << server;
+      std::uint64_t parts = 0;
+      STRATA_EXPECT_OK(db(server)
+                           .objects()
+                           .ListInferred({},
+                                         kShared,
+                                         {},
+                                         [&](const InferredPart&) {
+                                           ++parts;
+                                           return absl::OkStatus();
+                                         })
+                           .status());
+      EXPECT_EQ(parts, 2U) << server;
+    }
+    robot.join();
+    STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  }
+  EXPECT_EQ(Owner(), "b");
+  EXPECT_EQ(Ask("SELECT count(*)::text FROM map_edit"), "0");
 }
 
 TEST_F(WorkersTest, AJobIsCancelledWhereverItRuns) {
