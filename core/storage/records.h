@@ -59,6 +59,8 @@ struct WaitingMap {
 // got the map: "HOLDER/TOKEN", by which the server's commits are told from those of one that has
 // lost it.
 inline constexpr char kRunBy[] = "run_by";
+// The same of one whose proposal is in the store and to be applied, which only who has the map can.
+inline constexpr char kAccepted[] = "accepted";
 
 // A job of some map that waits or runs.
 struct UnfinishedJob {
@@ -66,7 +68,8 @@ struct UnfinishedJob {
   std::uint64_t id = 0;
   std::string kind;
   JobState state = JobState::kQueued;
-  std::string run_by;  // kRunBy; empty: not set
+  std::string run_by;     // kRunBy; empty: not set
+  bool accepted = false;  // kAccepted
 };
 
 // A scan without its points.

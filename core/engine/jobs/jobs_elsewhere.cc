@@ -83,6 +83,7 @@ class BesideContext final : public JobContext {
   void SetMetric(const std::string& name, double value) override { result_.metrics[name] = value; }
   void SetMessage(std::string message) override { result_.message = std::move(message); }
   void SetProposed() override { result_.proposed = true; }
+  void SetAccepted() override { result_.accepted = true; }
 
  private:
   MapCore& core_;
@@ -225,7 +226,8 @@ absl::StatusOr<bool> JobsElsewhere::RunNext() {
                        (!job.run_by.empty() && !alive.contains(HolderOf(job.run_by)));
     // Those of an earlier life of this server nobody else takes for dead.
     const bool mine = HolderOf(job.run_by) == holder_;
-    if (!waits || !RunsAnywhere(job.kind) || (is_open_(job.map) && !mine)) continue;
+    if (!waits || !RunsAnywhere(job.kind) || job.accepted) continue;
+    if (is_open_(job.map) && !mine) continue;
     const std::string run_by = NewRunBy(holder_);
     STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> taken, Take(job, run_by));
     if (!taken.has_value()) continue;
@@ -251,7 +253,7 @@ absl::StatusOr<std::optional<JobInfo>> JobsElsewhere::Take(const UnfinishedJob& 
     if (found == all.end() || std::ranges::any_of(all, runs)) return absl::OkStatus();
     const bool dead = RunsElsewhere(*found) && RunBy(*found) == job.run_by;
     if (dead) STRATA_RETURN_IF_ERROR(ReturnDeadJob(*found, writer));
-    if (found->state == JobState::kQueued) {
+    if (found->state == JobState::kQueued && RunsAnywhere(*found)) {
       found->state = JobState::kRunning;
       found->parameters[kRunBy] = run_by;
       taken = *found;

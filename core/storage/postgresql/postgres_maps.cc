@@ -376,18 +376,22 @@ absl::StatusOr<std::vector<UnfinishedJob>> PostgresMaps::ListUnfinishedJobs() co
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
       lease->Query(
-          "SELECT p.name, j.id, j.kind, j.state, coalesce(r.value, '') FROM truth_job AS j JOIN "
+          "SELECT p.name, j.id, j.kind, j.state, coalesce(r.value, ''), EXISTS (SELECT FROM "
+          "truth_job_parameter AS a WHERE a.map = j.map AND a.job = j.id AND a.name = $3) FROM "
+          "truth_job AS j JOIN "
           "map_place AS p ON p.map = j.map AND p.state = $1 LEFT JOIN truth_job_parameter AS r ON "
           "r.map = j.map AND r.job = j.id AND r.name = $2 WHERE j.state < 3 ORDER BY j.updated_us",
           kThere,
-          absl::string_view(kRunBy)));
+          absl::string_view(kRunBy),
+          absl::string_view(kAccepted)));
   std::vector<UnfinishedJob> jobs;
   while (row.Next()) {
     jobs.push_back({row.Text(0),
                     row.Unsigned(1),
                     row.Text(2),
                     static_cast<JobState>(row.Int(3)),
-                    row.Text(4)});
+                    row.Text(4),
+                    row.Bool(5)});
   }
   return jobs;
 }

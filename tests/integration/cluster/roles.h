@@ -65,6 +65,7 @@ inline absl::Status Write(api::ScanUpload& upload,
       return cloud.points.begin() + static_cast<std::ptrdiff_t>(std::min(point, end));
     };
     piece.points.assign(at(begin), at(begin + kPiece));
+    if (!cloud.label.empty()) piece.label.assign(piece.size(), cloud.label.front());
     STRATA_RETURN_IF_ERROR(upload.Write(piece));
   }
   return absl::OkStatus();
@@ -95,10 +96,11 @@ class RolesTest : public SharingServersTest {
   }
   // Who runs a job of a map that another has.
   std::string RunBy() { return Ask("SELECT value FROM truth_job_parameter WHERE name = 'run_by'"); }
-  // Scans that a job has seconds of work with.
-  void PutLargeScans() {
+  // Scans that a job has seconds of work with, of one class.
+  void PutLargeScans(std::size_t points = 200'000) {
     for (std::uint64_t scan = 1; scan <= 2; ++scan) {
-      const PointCloud cloud = NumberedCloud(scan, 200'000);
+      PointCloud cloud = NumberedCloud(scan, points);
+      cloud.label.assign(cloud.size(), kThing);
       STRATA_ASSERT_OK_AND_ASSIGN(const auto upload,
                                   db(0).scans().Upload({}, kShared, NumberedHeader(scan, cloud)));
       STRATA_ASSERT_OK(Write(*upload, cloud, 0, cloud.size()));
@@ -106,8 +108,8 @@ class RolesTest : public SharingServersTest {
     }
     STRATA_ASSERT_OK(AtRest(db(0), kShared));
   }
-  JobInfo Started(const char* kind) {
-    const auto job = db(0).jobs().Start({}, kShared, kind, {});
+  JobInfo Started(const char* kind, const JobParameters& parameters = {}) {
+    const auto job = db(0).jobs().Start({}, kShared, kind, parameters);
     STRATA_EXPECT_OK(job);
     return job.value_or(JobInfo());
   }

@@ -25,6 +25,22 @@ using ::testing::HasSubstr;
 
 class WorkersTest : public RolesTest {};
 
+// A person's word of where the later scan is, seen from the earlier one.
+absl::Status HoldApart(api::Database& db, std::uint64_t i, std::uint64_t j, double x_m) {
+  Constraint constraint;
+  constraint.i = {"run", i};
+  constraint.j = {"run", j};
+  constraint.T_i_j.translation().x() = x_m;
+  constraint.information = Matrix6d::Identity() * 1e8;
+  return db.posegraph().AddConstraint({}, kShared, constraint).status();
+}
+
+double XOf(api::Database& db, std::uint64_t sequence) {
+  const auto found = db.posegraph().LookupPose({}, kShared, {"run", sequence});
+  STRATA_EXPECT_OK(found);
+  return found.ok() ? found->T_map_scan.translation().x() : -1.0;
+}
+
 // A block as of a kind that a map has twice, which nobody saw from above.
 PointCloud BlockAt(float x_m) {
   PointCloud cloud;
@@ -131,6 +147,50 @@ TEST_F(WorkersTest, WhatAWorkerInfersIsToldByAll) {
   EXPECT_EQ(Ask("SELECT count(*)::text FROM map_edit"), "0");
 }
 
+// As an epoch of the owner's: with scans that came in since, once, also where he dies before.
+TEST_F(WorkersTest, WhatAWorkerProposesIsAppliedByTheOwner) {
+  STRATA_ASSERT_OK(db(0).maps().Create({}, kShared, MapParameters()));
+  Add("b", "integrator");
+  Add("c", "worker");
+  for (const std::uint64_t scan : {1, 2}) STRATA_ASSERT_OK(PutNumbered(db(0), kShared, scan));
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  STRATA_ASSERT_OK(HoldApart(db(0), 1, 2, 0.2));
+  JobParameters given = {{"closures", "0"}, {"planes", "0"}, {"dry_run", "1"}};
+  const JobInfo proposed = Ended(Started("optimize", given).id);
+  ASSERT_EQ(proposed.state, JobState::kProposed) << proposed.message;
+  EXPECT_EQ(db(1).maps().Stats({}, kShared)->epoch, 1U);
+  STRATA_ASSERT_OK(PutNumbered(db(0), kShared, 3));
+  STRATA_ASSERT_OK(AtRest(db(0), kShared));
+  STRATA_ASSERT_OK(HoldApart(db(0), 2, 3, 0.0));
+  STRATA_ASSERT_OK(db(0).jobs().Accept({}, kShared, proposed.id));
+  const JobInfo applied = Ended(proposed.id);
+  ASSERT_EQ(applied.state, JobState::kSucceeded) << applied.message;
+  EXPECT_EQ(applied.metrics.at("scans_carried"), 1.0);
+  EXPECT_NEAR(XOf(db(1), 2) - XOf(db(1), 1), 0.2, 1e-3);
+  EXPECT_NEAR(XOf(db(1), 3), XOf(db(1), 2), 1e-3);
+  given.erase("dry_run");
+  for (const bool owner_dies : {false, true}) {
+    STRATA_ASSERT_OK(Insist([&] { return SetX(*servers_[0]->db(), 2, 5.0); }));
+    const JobInfo job = Started("optimize", given);
+    if (owner_dies) {
+      STRATA_EXPECT_OK(Insist([&] {
+        const bool handed = Ask("SELECT value FROM truth_job_parameter WHERE name = 'accepted' AND "
+                                "job = (SELECT max(id) FROM truth_job)") == "1";
+        return handed ? absl::OkStatus() : absl::UnavailableError("it is not proposed yet");
+      }));
+      servers_[1]->Kill();
+      Add("d", "integrator");
+    }
+    const JobInfo ended = Ended(job.id);
+    EXPECT_EQ(ended.state, JobState::kSucceeded) << ended.message;
+    EXPECT_NEAR(XOf(db(0), 2) - XOf(db(0), 1), 0.2, 1e-3);
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto epochs, db(0).maps().History({}, kShared));
+    EXPECT_EQ(std::ranges::count(epochs, job.id, &EpochInfo::job), 1);
+    EXPECT_EQ(epochs[0].job, job.id);
+  }
+  EXPECT_EQ(Owner(), "d");
+}
+
 TEST_F(WorkersTest, AJobIsCancelledWhereverItRuns) {
   STRATA_ASSERT_OK(db(0).maps().Create({}, kShared, MapParameters()));
   Add("b", "integrator");
@@ -200,6 +260,31 @@ TEST_F(WorkersTest, AJobOutlivesItsWorker) {
   EXPECT_TRUE(then == by || then.empty()) << then;
   EXPECT_EQ(Ended(job.id).state, JobState::kSucceeded) << Ended(job.id).message;
   EXPECT_EQ(Ask("SELECT count(*)::text FROM attempt WHERE under_way = 1"), "0");
+}
+
+// What they keep and propose is kept once, by the one that has the job.
+TEST_F(WorkersTest, JobsThatPublishOutliveTheirWorker) {
+  STRATA_ASSERT_OK(db(0).maps().Create({}, kShared, MapParameters()));
+  Add("b", "integrator");
+  Add("c", "worker");
+  Add("d", "worker");
+  PutLargeScans(10'000);
+  for (const char* kind : {"objects", "optimize"}) {
+    const JobInfo job = Started(kind);
+    const std::string first = AwaitRun();
+    const bool at_c =
+        Ask("SELECT holder FROM map_server WHERE server = 'c'") == first.substr(0, first.find('/'));
+    SharingServer& frozen = *servers_[at_c ? 2 : 3];
+    frozen.Signal(SIGSTOP);
+    EXPECT_NE(AwaitRun(first), first);
+    frozen.Signal(SIGCONT);
+    const JobInfo ended = Ended(job.id);
+    EXPECT_EQ(ended.state, JobState::kSucceeded) << kind << ": " << ended.message;
+    EXPECT_EQ(RunBy(), "");
+  }
+  EXPECT_EQ(Ask("SELECT string_agg(DISTINCT job::text, ' ') FROM derived_entity"), "1");
+  EXPECT_LE(db(0).maps().History({}, kShared)->size(), 2U);
+  EXPECT_EQ(Owner(), "b");
 }
 
 }  // namespace
