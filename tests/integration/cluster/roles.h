@@ -116,7 +116,7 @@ class RolesTest : public SharingServersTest {
   JobInfo Ended(std::uint64_t id) {
     JobInfo last;
     STRATA_EXPECT_OK(
-        db(0).jobs().Watch(Within(kPatience), kShared, id, [&last](const JobInfo& now) {
+        db(0).jobs().Watch(Within(4 * kPatience), kShared, id, [&last](const JobInfo& now) {
           last = now;
           return absl::OkStatus();
         }));
