@@ -299,8 +299,8 @@ void AddSharing(CLI::App& app, Written& o) {
          "--role",
          o.roles,
          "What this server does: each answers calls (gateway); an integrator takes maps, joins "
-         "scans into them and runs jobs that change tiles or poses; a worker runs the other "
-         "jobs, of any map")
+         "scans into them and changes their tiles and poses; a worker runs jobs that leave "
+         "that to it, of any map")
       ->type_name("gateway,integrator,worker")
       ->delimiter(',')
       ->check(CLI::IsMember({"gateway", "integrator", "worker"}).description(""))

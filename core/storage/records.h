@@ -55,16 +55,12 @@ struct WaitingMap {
   bool deletion = false;    // of the map (EditKind::kDeleteMap)
 };
 
-// A server that lives, on the same store.
-struct LiveServer {
-  std::string holder;  // which it is, however often it is started
-  bool works = false;  // it runs jobs of maps that others have
-};
-
 // A parameter that no kind has, set on a job as it is stored while a server runs it that has not
 // got the map: "HOLDER/TOKEN", by which the server's commits are told from those of one that has
 // lost it.
 inline constexpr char kRunBy[] = "run_by";
+// The same of one whose proposal is in the store and to be applied, which only who has the map can.
+inline constexpr char kAccepted[] = "accepted";
 
 // A job of some map that waits or runs.
 struct UnfinishedJob {
@@ -72,7 +68,8 @@ struct UnfinishedJob {
   std::uint64_t id = 0;
   std::string kind;
   JobState state = JobState::kQueued;
-  std::string run_by;  // kRunBy; empty: not set
+  std::string run_by;     // kRunBy; empty: not set
+  bool accepted = false;  // kAccepted
 };
 
 // A scan without its points.
@@ -110,7 +107,8 @@ enum class EditKind : std::uint8_t {  // stored
   kSetLabels = 3,
   kUpdateLabels = 4,  // those that are 0 leave what people said
   kSetDefaultProfile = 5,
-  kDeleteMap = 6,  // which is no work of its worker's: WaitingMap::deletion
+  kDeleteMap = 6,     // which is no work of its worker's: WaitingMap::deletion
+  kTellInferred = 7,  // its watchers, that what is inferred is another: a job beside it has kept it
 };
 
 // An edit that is asked for where another process has the map.

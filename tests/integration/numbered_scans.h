@@ -29,6 +29,7 @@ inline ScanHeader NumberedHeader(std::uint64_t sequence, const PointCloud& cloud
   header.id = {"run", sequence};
   header.alignment = Alignment::kOff;
   header.point_count = cloud.size();
+  header.has_label = !cloud.label.empty();
   header.content_hash = ContentHashOf(header, cloud);
   return header;
 }

@@ -45,6 +45,7 @@ class PartOfJob final : public JobContext {
   void SetMetric(const std::string& name, double value) override { whole_.SetMetric(name, value); }
   void SetMessage(std::string message) override { whole_.SetMessage(std::move(message)); }
   void SetProposed() override { whole_.SetProposed(); }
+  void SetAccepted() override { whole_.SetAccepted(); }
 
  private:
   JobContext& whole_;
@@ -267,10 +268,29 @@ absl::Status Drop(MapCore& core, const JobInfo& job, const Stop& stop) {
   });
 }
 
+// Makes the proposal the next epoch.
+absl::Status Apply(MapCore& core,
+                   Worker& worker,
+                   const JobInfo& job,
+                   std::uint64_t base_epoch,
+                   const MoveTolerance& tolerance,
+                   int threads,
+                   DamagedScans& damaged,
+                   JobContext& context) {
+  TilesAhead ahead(core);
+  const bool made =
+      MakeAhead(core, job, base_epoch, tolerance, threads, context.stop(), ahead).ok();
+  const auto apply = [&](Integrator& integrator) {
+    return ApplyProposal(
+        integrator, job, base_epoch, tolerance, threads, damaged, made ? &ahead : nullptr, context);
+  };
+  return worker.Execute(context.stop(), apply, absl::StrCat("job ", job.id, " (", job.kind, ")"));
+}
+
 }  // namespace
 
 absl::Status RunOptimizeJob(MapCore& core,
-                            Worker& worker,
+                            Worker* worker,
                             const JobInfo& job,
                             const JobArguments& arguments,
                             JobContext& context) {
@@ -291,25 +311,12 @@ absl::Status RunOptimizeJob(MapCore& core,
     STRATA_RETURN_IF_ERROR(Drop(core, job, context.stop()));
   } else if (!accepted && (settings.dry_run || is_refused)) {
     context.SetProposed();
+  } else if (worker == nullptr) {
+    context.SetAccepted();
   } else {
     PartOfJob part(context, accepted ? 0.0 : kAlignmentEnd, 1.0);
-    TilesAhead ahead(core);
-    const bool made =
-        MakeAhead(
-            core, job, proposed.base_epoch, settings.tolerance, threads, context.stop(), ahead)
-            .ok();
-    const auto apply = [&](Integrator& integrator) {
-      return ApplyProposal(integrator,
-                           job,
-                           proposed.base_epoch,
-                           settings.tolerance,
-                           threads,
-                           damaged,
-                           made ? &ahead : nullptr,
-                           part);
-    };
     STRATA_RETURN_IF_ERROR(
-        worker.Execute(context.stop(), apply, absl::StrCat("job ", job.id, " (", job.kind, ")")));
+        Apply(core, *worker, job, proposed.base_epoch, settings.tolerance, threads, damaged, part));
   }
   const bool told = accepted && job.metrics.contains("left_out") &&
                     job.metrics.at("left_out") > 0.0;  // by the proposal

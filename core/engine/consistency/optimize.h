@@ -13,9 +13,10 @@
 namespace strata {
 
 // Runs the job beside uploads, integration and reads; only the making of the next epoch is the
-// worker's. A dry run, and any run until then, leaves nothing but a proposal.
+// worker's. A dry run, and any run until then, leaves nothing but a proposal, which is left to who
+// has the map (JobContext::SetAccepted()) where `worker` is nullptr.
 absl::Status RunOptimizeJob(MapCore& core,
-                            Worker& worker,
+                            Worker* worker,
                             const JobInfo& job,
                             const JobArguments& arguments,
                             JobContext& context);

@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include "absl/algorithm/container.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -110,10 +110,8 @@ absl::StatusOr<std::unique_ptr<EngineMaps>> EngineMaps::Open(const EngineOptions
 
 absl::Status EngineMaps::CheckWorked(absl::string_view kind) const {
   if (options_.works || !RunsAnywhere(kind)) return absl::OkStatus();
-  STRATA_ASSIGN_OR_RETURN(const std::vector<LiveServer> servers, stores_->ListServers());
-  if (absl::c_any_of(servers, [](const LiveServer& server) { return server.works; })) {
-    return absl::OkStatus();
-  }
+  STRATA_ASSIGN_OR_RETURN(const std::set<std::string> workers, stores_->ListWorkers());
+  if (!workers.empty()) return absl::OkStatus();
   return absl::UnavailableError(absl::StrCat(
       "no server on this store runs jobs of kind ", kind, ": start one with --role worker"));
 }

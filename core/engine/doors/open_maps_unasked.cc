@@ -176,13 +176,8 @@ bool OpenMaps::TellOfArrivals() {
 }
 
 void OpenMaps::ReturnDeadJobs(Map& map) {
-  const absl::StatusOr<std::vector<LiveServer>> servers = stores_.ListServers();
-  if (!servers.ok()) return;
-  std::set<std::string> alive;
-  for (const LiveServer& server : *servers) {
-    if (server.works) alive.insert(server.holder);
-  }
-  map.ReturnDeadJobs(alive).IgnoreError();  // the next look may succeed
+  const absl::StatusOr<std::set<std::string>> alive = stores_.ListWorkers();
+  if (alive.ok()) map.ReturnDeadJobs(*alive).IgnoreError();  // the next look may succeed
 }
 
 void OpenMaps::RemoveAsAsked(const std::string& name) {

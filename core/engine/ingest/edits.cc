@@ -55,6 +55,13 @@ absl::StatusOr<RobotProfile> ProfileOf(const EditRequest& edit) {
   return profile;
 }
 
+absl::Status TellInferred(MapCore& core, Integrator::Decision also) {
+  return core.Publish({}, {}, true, [&](StorageWriter& writer) {
+    core.NoteInferred();
+    return also(writer);
+  });
+}
+
 }  // namespace
 
 EditRequest SettingPose(const ScanId& id, const Pose& T_map_scan) {
@@ -106,6 +113,8 @@ absl::Status CarryOut(const EditRequest& edit,
       STRATA_ASSIGN_OR_RETURN(const RobotProfile profile, ProfileOf(edit));
       return integrator.SetDefaultProfile(profile, stop, also);
     }
+    case EditKind::kTellInferred:
+      return TellInferred(integrator.core(), also);
     case EditKind::kDeleteMap:
       break;
   }

@@ -41,10 +41,12 @@ absl::Status TakeFreeId(StorageReader& reader, JobInfo& job) {
 }
 
 // Whether other engines may have made the stored state of the shown one.
-bool DecidedElsewhere(JobState shown, JobState stored) {
-  if (shown == JobState::kQueued) return IsFinal(stored);
-  return shown == JobState::kProposed &&
-         (stored == JobState::kQueued || stored == JobState::kCancelled);
+bool DecidedElsewhere(const JobInfo& shown, const JobInfo& stored) {
+  const bool queued = stored.state == JobState::kQueued;
+  if (shown.state == JobState::kQueued) {
+    return IsFinal(stored.state) || (queued && IsAccepted(stored) != IsAccepted(shown));
+  }
+  return shown.state == JobState::kProposed && (queued || stored.state == JobState::kCancelled);
 }
 
 // Of the engine before, which ran them: here nobody does.
@@ -53,7 +55,7 @@ absl::Status LeaveToWorkers(MapCore& core, const std::vector<JobInfo>& jobs) {
       Durability::kRelaxed, 0, Stop(), [&](StorageWriter& writer) -> absl::Status {
         for (const JobInfo& job : jobs) {
           const bool left = job.state == JobState::kRunning && !RunsElsewhere(job);
-          if (!left || !RunsAnywhere(job.kind)) continue;
+          if (!left || !RunsAnywhere(job)) continue;
           JobInfo queued = job;
           queued.state = JobState::kQueued;
           STRATA_RETURN_IF_ERROR(writer.PutJob(queued));
@@ -93,6 +95,7 @@ class JobBoard::Running final : public JobContext {
   void SetMetric(const std::string& name, double value) override { result_.metrics[name] = value; }
   void SetMessage(std::string message) override { result_.message = std::move(message); }
   void SetProposed() override { result_.proposed = true; }
+  void SetAccepted() override { result_.accepted = true; }
 
   const JobResult& result() const { return result_; }
 
@@ -304,7 +307,7 @@ void JobBoard::TakeInOne(JobInfo&& stored, const AllShown& before) {
   if (entry.changes != shown->second.changes) return;
   const bool ran_elsewhere = RunsElsewhere(entry.info) || RunsElsewhere(stored);
   const bool news = stored.state != entry.info.state || stored.updated != entry.info.updated;
-  if (!(ran_elsewhere && news) && !DecidedElsewhere(entry.info.state, stored.state)) return;
+  if (!(ran_elsewhere && news) && !DecidedElsewhere(entry.info, stored)) return;
   entry.info = std::move(stored);
   ++entry.changes;
 }
@@ -474,7 +477,7 @@ std::optional<std::uint64_t> JobBoard::NextIdLocked() const {
   for (const auto& [id, entry] : jobs_) {
     if (RunsElsewhere(entry->info)) return std::nullopt;
     if (entry->info.state != JobState::kQueued) continue;
-    if (!works && RunsAnywhere(entry->info.kind)) continue;
+    if (!works && RunsAnywhere(entry->info)) continue;
     const auto turn = turns_.find(entry->owner);
     const std::pair mine(turn == turns_.end() ? 0 : turn->second, id);
     if (!next.has_value() || mine < *next) next = mine;

@@ -57,8 +57,14 @@ absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer) {
 void EndJob(JobInfo& job, const absl::Status& ended, const JobResult& result) {
   for (const auto& [name, value] : result.metrics) job.metrics[name] = value;
   job.phase.clear();
-  ForgetToldToEnd(job);
   job.parameters.erase(kRunBy);
+  if (ended.ok() && result.accepted) {  // and if it was told to end meanwhile, that goes on to hold
+    job.state = JobState::kQueued;
+    job.parameters.emplace(kAccepted, "1");
+    job.message = result.message;
+    return;
+  }
+  ForgetToldToEnd(job);
   if (ended.ok()) {
     job.state = result.proposed ? JobState::kProposed : JobState::kSucceeded;
     job.progress = 1.0;
@@ -81,6 +87,8 @@ std::string RunBy(const JobInfo& job) {
 std::string HolderOf(absl::string_view run_by) {
   return std::string(run_by.substr(0, run_by.find('/')));
 }
+
+bool IsAccepted(const JobInfo& job) { return job.parameters.contains(kAccepted); }
 
 absl::Status ReturnDeadJob(JobInfo& job, StorageWriter& writer) {
   const WorkId work{WorkKind::kJob, job.id};

@@ -39,14 +39,16 @@ struct JobResult {
   std::map<std::string, double> metrics;
   std::string message;
   bool proposed = false;
+  bool accepted = false;  // by itself: who has the map is to apply it
 };
-// The job has ended so.
+// The job has ended so, or waits for who has the map.
 void EndJob(JobInfo& job, const absl::Status& ended, const JobResult& result);
 
 // Of a job that a server runs that has not got the map (kRunBy).
 bool RunsElsewhere(const JobInfo& job);
 std::string RunBy(const JobInfo& job);
 std::string HolderOf(absl::string_view run_by);
+bool IsAccepted(const JobInfo& job);
 // The server that ran it so has died: the job waits again, has ended if it was told to, or is put
 // aside if that was the last of many deaths. Inside a commit that puts the job afterwards.
 absl::Status ReturnDeadJob(JobInfo& job, StorageWriter& writer);

@@ -8,6 +8,7 @@
 #include "core/engine/consistency/optimize.h"
 #include "core/engine/consistency/revert.h"
 #include "core/engine/ingest/integrator.h"
+#include "core/engine/jobs/job_changes.h"
 #include "core/engine/labels/classifier_store.h"
 #include "core/engine/labels/classify.h"
 #include "core/engine/labels/fade.h"
@@ -75,7 +76,7 @@ absl::Status RunVerify(const JobRun& run) {
 }
 
 absl::Status RunOptimize(const JobRun& run) {
-  return RunOptimizeJob(run.core, *run.worker, run.job, run.arguments, run.context);
+  return RunOptimizeJob(run.core, run.worker, run.job, run.arguments, run.context);
 }
 
 absl::Status RunRevert(const JobRun& run) {
@@ -119,15 +120,15 @@ const std::vector<JobHandler>& JobHandlers() {
   static const auto* const handlers = new std::vector<JobHandler>{
       {kRebuildJob, NeedsNothing, RunRebuild},
       {kVerifyJob, NeedsNothing, RunVerify, /*anywhere=*/true},
-      {kOptimizeJob, NeedsNothing, RunOptimize},
+      {kOptimizeJob, NeedsNothing, RunOptimize, /*anywhere=*/true},
       {kRevertJob, NeedsNothing, RunRevert},
       {kTrainJob, NeedsFreeName, RunTrain, /*anywhere=*/true},
       {kClassifyJob, NeedsClassifier, RunClassify},
       {kEvaluateJob, NeedsClassifier, RunEvaluate, /*anywhere=*/true},
       {kFadeJob, NeedsPoints, RunFade},
       {kPlanesJob, NeedsPoints, RunPlanes, /*anywhere=*/true},
-      {kObjectsJob, NeedsPointsAndClass, RunObjects},
-      {kCompleteJob, NeedsPoints, RunComplete},
+      {kObjectsJob, NeedsPointsAndClass, RunObjects, /*anywhere=*/true},
+      {kCompleteJob, NeedsPoints, RunComplete, /*anywhere=*/true},
   };
   return *handlers;
 }
@@ -136,6 +137,8 @@ bool RunsAnywhere(absl::string_view kind) {
   const absl::StatusOr<const JobHandler*> handler = FindJobHandler(kind);
   return handler.ok() && (*handler)->anywhere;
 }
+
+bool RunsAnywhere(const JobInfo& job) { return RunsAnywhere(job.kind) && !IsAccepted(job); }
 
 absl::Status RunHandler(MapCore& core, Worker* worker, const JobInfo& job, JobContext& context) {
   STRATA_ASSIGN_OR_RETURN(const JobHandler* const handler, FindJobHandler(job.kind));

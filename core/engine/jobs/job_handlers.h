@@ -33,7 +33,8 @@ struct JobHandler {
   absl::Status (*check)(StorageReader& reader, const JobArguments& arguments);
   // On the thread of jobs.
   absl::Status (*run)(const JobRun& run);
-  // It asks nothing of who has the map: whatever engine can run it, on `core` alone.
+  // It asks nothing of who has the map, but to apply what it proposes: whatever engine can run it,
+  // on `core` alone.
   bool anywhere = false;
 };
 
@@ -42,8 +43,10 @@ const std::vector<JobHandler>& JobHandlers();
 // INVALID_ARGUMENT for a kind that there is not.
 absl::StatusOr<const JobHandler*> FindJobHandler(absl::string_view kind);
 
-// Whether jobs of the kind can be run by an engine that has not got the map.
+// Whether jobs of the kind can be run by an engine that has not got the map, and whether this one
+// can as it is now.
 bool RunsAnywhere(absl::string_view kind);
+bool RunsAnywhere(const JobInfo& job);
 // Does what the job asks for. `worker` as of JobRun.
 absl::Status RunHandler(MapCore& core, Worker* worker, const JobInfo& job, JobContext& context);
 

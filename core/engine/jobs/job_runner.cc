@@ -38,6 +38,12 @@ void LogError(absl::string_view event, absl::string_view map, const absl::Status
   }).IgnoreError();
 }
 
+bool AnyUnfinished(const std::vector<JobInfo>& jobs, absl::string_view kind) {
+  return std::any_of(jobs.begin(), jobs.end(), [kind](const JobInfo& job) {
+    return job.kind == kind && !IsFinal(job.state);
+  });
+}
+
 // Whether a job that begins has made its epoch already, and was killed before it could say so; a
 // second one would not be undone with the first. If so, tells what is known.
 absl::StatusOr<bool> HasMadeItsEpoch(MapCore& core, const JobInfo& job, JobContext& context) {
@@ -131,6 +137,7 @@ void JobRunner::RunJob() {
 }
 
 absl::StatusOr<bool> JobRunner::OptimizeIsDue() {
+  if (AnyUnfinished(jobs_.List(), kOptimizeJob)) return false;  // which a worker runs, or will
   // Somebody has still to decide about a proposal, which another epoch would make worthless.
   if (jobs_.AnyIn(JobState::kProposed)) {
     STRATA_RETURN_IF_ERROR(jobs_.TakeIn().status());  // who may have decided elsewhere

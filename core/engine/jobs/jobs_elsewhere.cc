@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include <glog/logging.h>
 
@@ -33,6 +34,9 @@ namespace {
 constexpr absl::Duration kProgressInterval = absl::Seconds(2);
 constexpr absl::Duration kLookInterval = absl::Seconds(1);
 constexpr absl::Duration kClosingPoll = absl::Milliseconds(100);
+// So long a job that has published waits for who has the map.
+constexpr absl::Duration kLongestTelling = absl::Seconds(10);
+constexpr absl::Duration kTellingPoll = absl::Milliseconds(20);
 
 std::string NewRunBy(const std::string& holder) {
   absl::BitGen random;
@@ -79,6 +83,7 @@ class BesideContext final : public JobContext {
   void SetMetric(const std::string& name, double value) override { result_.metrics[name] = value; }
   void SetMessage(std::string message) override { result_.message = std::move(message); }
   void SetProposed() override { result_.proposed = true; }
+  void SetAccepted() override { result_.accepted = true; }
 
  private:
   MapCore& core_;
@@ -144,6 +149,32 @@ class RunWatch {
   std::thread thread_;
 };
 
+// Whoever sees that the job has ended is shown what it published, wherever he asks: so it ends when
+// who has the map has told of that. Where nobody has it, or is busy, it is told later.
+void AwaitTold(MapCore& core, const Stop& stop) {
+  const std::uint64_t asked = core.asked_to_tell();
+  const absl::Time end = SteadyNow() + kLongestTelling;
+  const auto is_told = [&]() -> absl::StatusOr<bool> {
+    STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+    STRATA_ASSIGN_OR_RETURN(const std::optional<absl::Status> told, reader->FindAnswer(asked));
+    return told.has_value();
+  };
+  while (asked > 0 && SteadyNow() < end && !stop.requested()) {
+    const absl::StatusOr<bool> told = is_told();
+    if (!told.ok()) return;
+    if (*told) {
+      core.writer()
+          .Run(Durability::kRelaxed,
+               0,
+               stop,
+               [asked](StorageWriter& writer) { return writer.ForgetEdit(asked); })
+          .IgnoreError();  // who asks next does, an hour later
+      return;
+    }
+    absl::SleepFor(kTellingPoll);
+  }
+}
+
 }  // namespace
 
 JobsElsewhere::JobsElsewhere(const EngineOptions& options,
@@ -187,10 +218,7 @@ absl::StatusOr<bool> JobsElsewhere::RunNext() {
   STRATA_ASSIGN_OR_RETURN(const std::vector<UnfinishedJob> jobs, stores_.ListUnfinishedJobs());
   std::set<std::string> alive;
   if (std::ranges::any_of(jobs, [](const UnfinishedJob& job) { return !job.run_by.empty(); })) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<LiveServer> servers, stores_.ListServers());
-    for (const LiveServer& server : servers) {
-      if (server.works) alive.insert(server.holder);
-    }
+    STRATA_ASSIGN_OR_RETURN(alive, stores_.ListWorkers());
   }
   alive.erase(holder_);  // it runs none now: what says so is of an earlier life
   for (const UnfinishedJob& job : jobs) {
@@ -198,7 +226,8 @@ absl::StatusOr<bool> JobsElsewhere::RunNext() {
                        (!job.run_by.empty() && !alive.contains(HolderOf(job.run_by)));
     // Those of an earlier life of this server nobody else takes for dead.
     const bool mine = HolderOf(job.run_by) == holder_;
-    if (!waits || !RunsAnywhere(job.kind) || (is_open_(job.map) && !mine)) continue;
+    if (!waits || !RunsAnywhere(job.kind) || job.accepted) continue;
+    if (is_open_(job.map) && !mine) continue;
     const std::string run_by = NewRunBy(holder_);
     STRATA_ASSIGN_OR_RETURN(const std::optional<JobInfo> taken, Take(job, run_by));
     if (!taken.has_value()) continue;
@@ -224,7 +253,7 @@ absl::StatusOr<std::optional<JobInfo>> JobsElsewhere::Take(const UnfinishedJob& 
     if (found == all.end() || std::ranges::any_of(all, runs)) return absl::OkStatus();
     const bool dead = RunsElsewhere(*found) && RunBy(*found) == job.run_by;
     if (dead) STRATA_RETURN_IF_ERROR(ReturnDeadJob(*found, writer));
-    if (found->state == JobState::kQueued) {
+    if (found->state == JobState::kQueued && RunsAnywhere(*found)) {
       found->state = JobState::kRunning;
       found->parameters[kRunBy] = run_by;
       taken = *found;
@@ -242,12 +271,15 @@ absl::Status JobsElsewhere::Compute(const UnfinishedJob& job,
                                     const std::string& run_by,
                                     const Stop& stop,
                                     JobResult& result) {
+  if (IsToldToEnd(taken)) return absl::CancelledError("it was cancelled before it was run here");
   STRATA_ASSIGN_OR_RETURN(StoredMap stored, stores_.OpenToWork(job.map, job.id, run_by));
   STRATA_ASSIGN_OR_RETURN(const std::unique_ptr<MapCore> core,
                           MapCore::OpenBeside(job.map, std::move(stored), options_, caches_));
   BesideContext context(*core, job.id, stop, closing_, result);
   const RunWatch watch(*core, job.id, run_by, stop, closing_);
-  return RunHandler(*core, nullptr, taken, context);
+  STRATA_RETURN_IF_ERROR(RunHandler(*core, nullptr, taken, context));
+  AwaitTold(*core, stop);
+  return absl::OkStatus();
 }
 
 absl::Status JobsElsewhere::Run(const UnfinishedJob& job,

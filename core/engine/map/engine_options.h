@@ -24,12 +24,11 @@ struct EngineOptions {
   std::string store;
   // What other engines on `store` tell people of this one; empty: its directory's identity.
   std::string server_name;
-  // Whether it takes maps of `store`, integrates their scans and runs those of their jobs that
-  // change tiles or poses. Else it answers what can be answered beside those that do. Set without
-  // `store`.
+  // Whether it takes maps of `store`, integrates their scans and changes their tiles and poses, by
+  // jobs, too. Else it answers what can be answered beside those that do. Set without `store`.
   bool integrates = true;
-  // Whether it runs jobs of other kinds: of its own maps, and on `store` of any. Set without
-  // `store`.
+  // Whether it runs jobs that leave that to others: of its own maps, and on `store` of any. Set
+  // without `store`.
   bool works = true;
   // How long an engine that does not answer keeps its maps from others on `store`; in [1 s, 1 h].
   absl::Duration map_lease = absl::Seconds(10);

@@ -26,6 +26,8 @@ class JobContext {
   virtual void SetMessage(std::string message) = 0;
   // The job will end as proposed instead of succeeded.
   virtual void SetProposed() = 0;
+  // The job will wait for who has the map to apply its proposal.
+  virtual void SetAccepted() = 0;
 };
 
 // The parameter "threads", or else what the engine has a map use.
@@ -34,9 +36,7 @@ inline int ThreadsOf(const JobArguments& arguments, const EngineOptions& options
                                   : options.worker_threads;
 }
 
-// Parameters that no kind has, set on jobs as they are stored: of one whose proposal was accepted,
-// and of one that runs and is to end.
-inline constexpr char kAccepted[] = "accepted";
+// A parameter that no kind has, set on a job as it is stored that runs and is to end.
 inline constexpr char kToldToEnd[] = "told_to_end";
 
 // For work that nobody follows.
@@ -48,6 +48,7 @@ class SilentContext final : public JobContext {
   void SetMetric(const std::string&, double) override {}
   void SetMessage(std::string) override {}
   void SetProposed() override {}
+  void SetAccepted() override {}
 
  private:
   const Stop stop_;

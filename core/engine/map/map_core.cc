@@ -71,13 +71,23 @@ absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Open(const std::string& name,
                                                        const EngineOptions& options,
                                                        std::shared_ptr<CacheBudget> caches) {
   STRATA_RETURN_IF_ERROR(ClearLeftovers(stored.storage->writer()));
-  return OpenBeside(name, std::move(stored), options, std::move(caches));
+  return Make(name, std::move(stored), options, std::move(caches));
 }
 
 absl::StatusOr<std::unique_ptr<MapCore>> MapCore::OpenBeside(const std::string& name,
                                                              StoredMap stored,
                                                              const EngineOptions& options,
                                                              std::shared_ptr<CacheBudget> caches) {
+  STRATA_ASSIGN_OR_RETURN(std::unique_ptr<MapCore> core,
+                          Make(name, std::move(stored), options, std::move(caches)));
+  core->beside_ = true;
+  return core;
+}
+
+absl::StatusOr<std::unique_ptr<MapCore>> MapCore::Make(const std::string& name,
+                                                       StoredMap stored,
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches) {
   StorageWriter& writer = stored.storage->writer();
   STRATA_ASSIGN_OR_RETURN(MapInfo info, writer.reader().GetMapInfo());
   STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
@@ -180,6 +190,7 @@ absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
     // and whoever knows a number is told of later ones only.
     STRATA_RETURN_IF_ERROR(writer.NextCommitSequence().status());
     STRATA_ASSIGN_OR_RETURN(clock, writer.reader().GetClock());
+    if (beside_ && inferred_changes_) STRATA_RETURN_IF_ERROR(AskToTell(writer));
     return writer.PutChanges(
         StoredChangesOf(clock.commit_sequence, scans, tiles, inferred_changes_));
   };
@@ -189,6 +200,15 @@ absl::Status MapCore::Publish(const std::vector<ScanId>& scans,
   // Durable: what a reader saw of a version must not be given again with other bytes.
   return awaited ? writer_.Run(Durability::kFull, 0, Stop(), publish, show)
                  : writer_.RunBehind(publish, show);
+}
+
+// Others are told by the store, but who has the map tells by what it knows, and may have given its
+// watchers a later number than this one already: so it takes another.
+absl::Status MapCore::AskToTell(StorageWriter& writer) {
+  EditRequest edit;
+  edit.kind = EditKind::kTellInferred;
+  STRATA_ASSIGN_OR_RETURN(asked_to_tell_, writer.PutEdit(edit));
+  return absl::OkStatus();
 }
 
 absl::Status MapCore::AwaitShown(const Stop& stop) {

@@ -49,7 +49,8 @@ class MapCore {
                                                        const EngineOptions& options,
                                                        std::shared_ptr<CacheBudget> caches);
   // For a job that runs while another engine has the map: clears nothing, and what the other
-  // publishes meanwhile is not seen. `stored` as of MapStores::OpenToWork().
+  // publishes meanwhile is not seen. What it publishes of things (NoteInferred()) it asks the other
+  // to tell, in the same commit. `stored` as of MapStores::OpenToWork().
   static absl::StatusOr<std::unique_ptr<MapCore>> OpenBeside(const std::string& name,
                                                              StoredMap stored,
                                                              const EngineOptions& options,
@@ -98,6 +99,8 @@ class MapCore {
   void NoteInferred() { inferred_changes_ = true; }
   // The same before it takes something away, where there is something.
   absl::Status NoteInferredIfAny(StorageReader& reader);
+  // Of OpenBeside(): the last edit by which who has the map was asked to tell; 0: none.
+  std::uint64_t asked_to_tell() const { return asked_to_tell_; }
   // A prepared tile that the store keeps is damaged.
   void NoteUnreadable(const TileKey& key);
   // Those noted since the last call.
@@ -126,6 +129,11 @@ class MapCore {
           std::unique_ptr<MapStorage> storage,
           MapInfo info,
           const MapClock& clock);
+  static absl::StatusOr<std::unique_ptr<MapCore>> Make(const std::string& name,
+                                                       StoredMap stored,
+                                                       const EngineOptions& options,
+                                                       std::shared_ptr<CacheBudget> caches);
+  absl::Status AskToTell(StorageWriter& writer);
   // On the writer's thread, so that it happens in the order of commits.
   void Show(const MapClock& clock,
             const std::vector<ScanId>& scans,
@@ -150,6 +158,8 @@ class MapCore {
   std::atomic<bool> tiles_staged_ = false;
   std::atomic<std::uint64_t> edits_ = 0;
   std::atomic<bool> inferred_changes_ = false;  // since the last Show()
+  bool beside_ = false;                         // another engine has the map
+  std::atomic<std::uint64_t> asked_to_tell_ = 0;
 };
 
 }  // namespace strata

@@ -124,9 +124,7 @@ class PostgresStores final : public MapStores {
       const std::vector<std::string>& names) const override {
     return maps_.ListClocks(names);
   }
-  absl::StatusOr<std::vector<LiveServer>> ListServers() const override {
-    return maps_.ListServers();
-  }
+  absl::StatusOr<std::set<std::string>> ListWorkers() const override { return maps_.ListWorkers(); }
   absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const override {
     return maps_.ListUnfinishedJobs();
   }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -83,10 +84,10 @@ class MapStores {
   virtual absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const {
     return std::vector<WaitingMap>();
   }
-  // Of shared ones: engines that live; jobs that wait or run, of all maps; a map for a job that is
-  // run here while another engine has it, as of PostgresMaps::OpenToWork().
-  virtual absl::StatusOr<std::vector<LiveServer>> ListServers() const {
-    return std::vector<LiveServer>();
+  // Of shared ones: holders of engines that live and work; jobs that wait or run, of all maps; a
+  // map for a job that is run here while another engine has it, as of PostgresMaps::OpenToWork().
+  virtual absl::StatusOr<std::set<std::string>> ListWorkers() const {
+    return std::set<std::string>();
   }
   virtual absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const {
     return std::vector<UnfinishedJob>();

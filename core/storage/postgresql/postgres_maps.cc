@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -357,17 +358,17 @@ absl::StatusOr<std::vector<WaitingMap>> PostgresMaps::ListWaiting() const {
   return waiting;
 }
 
-absl::StatusOr<std::vector<LiveServer>> PostgresMaps::ListServers() const {
+absl::StatusOr<std::set<std::string>> PostgresMaps::ListWorkers() const {
   STRATA_ASSIGN_OR_RETURN(const ConnectionPool::Lease lease, pool_->Take());
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
       lease->Query("SELECT holder, roles FROM map_server WHERE expires > clock_timestamp()"));
-  std::vector<LiveServer> servers;
+  std::set<std::string> workers;
   while (row.Next()) {
     const std::vector<std::string> roles = absl::StrSplit(row.Text(1), ',');
-    servers.push_back({row.Text(0), absl::c_linear_search(roles, kWorkerRole)});
+    if (absl::c_linear_search(roles, kWorkerRole)) workers.insert(row.Text(0));
   }
-  return servers;
+  return workers;
 }
 
 absl::StatusOr<std::vector<UnfinishedJob>> PostgresMaps::ListUnfinishedJobs() const {
@@ -375,18 +376,22 @@ absl::StatusOr<std::vector<UnfinishedJob>> PostgresMaps::ListUnfinishedJobs() co
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
       lease->Query(
-          "SELECT p.name, j.id, j.kind, j.state, coalesce(r.value, '') FROM truth_job AS j JOIN "
+          "SELECT p.name, j.id, j.kind, j.state, coalesce(r.value, ''), EXISTS (SELECT FROM "
+          "truth_job_parameter AS a WHERE a.map = j.map AND a.job = j.id AND a.name = $3) FROM "
+          "truth_job AS j JOIN "
           "map_place AS p ON p.map = j.map AND p.state = $1 LEFT JOIN truth_job_parameter AS r ON "
           "r.map = j.map AND r.job = j.id AND r.name = $2 WHERE j.state < 3 ORDER BY j.updated_us",
           kThere,
-          absl::string_view(kRunBy)));
+          absl::string_view(kRunBy),
+          absl::string_view(kAccepted)));
   std::vector<UnfinishedJob> jobs;
   while (row.Next()) {
     jobs.push_back({row.Text(0),
                     row.Unsigned(1),
                     row.Text(2),
                     static_cast<JobState>(row.Int(3)),
-                    row.Text(4)});
+                    row.Text(4),
+                    row.Bool(5)});
   }
   return jobs;
 }

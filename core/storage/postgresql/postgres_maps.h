@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -93,8 +94,9 @@ class PostgresMaps {
   absl::Status Offer(absl::string_view name) const;
   // Those that this process has alone in which scans, jobs or edits wait, whoever added them.
   absl::StatusOr<std::vector<WaitingMap>> ListWaiting() const;
-  // Servers that live now.
-  absl::StatusOr<std::vector<LiveServer>> ListServers() const;
+  // Servers that live now and run jobs of maps that others have: which they are (LeaseOptions),
+  // however often they are started.
+  absl::StatusOr<std::set<std::string>> ListWorkers() const;
   // Of all maps, those longest unchanged first.
   absl::StatusOr<std::vector<UnfinishedJob>> ListUnfinishedJobs() const;
   // For a job that is run beside whoever has the map alone: commits are taken back, TakenAway(),

@@ -59,6 +59,7 @@ class Stepping final : public JobContext {
   void SetMetric(const std::string&, double) override {}
   void SetMessage(std::string) override {}
   void SetProposed() override {}
+  void SetAccepted() override {}
 
  private:
   const std::function<void()> step_;

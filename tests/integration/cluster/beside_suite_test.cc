@@ -1,5 +1,5 @@
-// The conformance suite by a server that takes no maps (a gateway), beside one on the same database
-// that does, which nobody asks for anything.
+// The conformance suite by a server that takes no maps, beside one on the same database that does
+// and runs no jobs of workers, which nobody asks for anything; and by that one.
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -29,12 +29,14 @@ struct Served {
   Served(const std::filesystem::path& directory,
          const std::string& store,
          const std::string& name,
-         bool integrates) {
+         bool integrates,
+         bool works) {
     EngineOptions engine_options;
     engine_options.directory = directory;
     engine_options.store = store;
     engine_options.server_name = name;
     engine_options.integrates = integrates;
+    engine_options.works = works;
     // Every upload waits for the owner's next look at what came in beside it.
     engine_options.look_interval = absl::Milliseconds(20);
     auto opened = OpenEngine(engine_options);
@@ -54,15 +56,15 @@ struct Served {
 
 class DatabaseBesideItsOwner final : public api::Database {
  public:
-  explicit DatabaseBesideItsOwner(const std::filesystem::path& directory) {
+  DatabaseBesideItsOwner(const std::filesystem::path& directory, bool ask_owner) {
     const auto cluster = SharedPostgresCluster();
     EXPECT_THAT(cluster, IsOk());
     const std::string store = (*cluster)->AddressOfOwn(directory.string());
     // Whose name is no address: its client is sent nowhere.
-    owner_.emplace(directory / "owner", store, "owner", /*integrates=*/true);
-    other_.emplace(directory / "other", store, "", /*integrates=*/false);
+    owner_.emplace(directory / "owner", store, "owner", /*integrates=*/true, /*works=*/false);
+    other_.emplace(directory / "other", store, "", /*integrates=*/false, /*works=*/true);
     ClientOptions options;
-    options.target = other_->server->address();
+    options.target = (ask_owner ? *owner_ : *other_).server->address();
     auto client = Connect(options);
     EXPECT_THAT(client, IsOk());
     client_ = *std::move(client);
@@ -118,12 +120,24 @@ TEST(BesideTheOwnerTest, AMapThatWasJustAskedForIsListed) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    BesideTheOwner,
-    DatabaseSuite,
-    ::testing::Values(DatabaseMaker{
-        "Beside", [](const auto& path) { return std::make_unique<DatabaseBesideItsOwner>(path); }}),
-    DatabaseMakerName);
+INSTANTIATE_TEST_SUITE_P(BesideTheOwner,
+                         DatabaseSuite,
+                         ::testing::Values(DatabaseMaker{
+                             "Beside",
+                             [](const auto& path) {
+                               return std::make_unique<DatabaseBesideItsOwner>(path, false);
+                             }}),
+                         DatabaseMakerName);
+
+// Whose jobs a worker runs.
+INSTANTIATE_TEST_SUITE_P(TheOwner,
+                         DatabaseSuite,
+                         ::testing::Values(DatabaseMaker{
+                             "Worked",
+                             [](const auto& path) {
+                               return std::make_unique<DatabaseBesideItsOwner>(path, true);
+                             }}),
+                         DatabaseMakerName);
 
 }  // namespace
 }  // namespace strata::testing

@@ -25,9 +25,13 @@
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
 #include "core/engine/doors/map.h"
+#include "core/engine/map/change_log.h"
+#include "core/engine/map/map_core.h"
 #include "core/engine/map/scan_lookup.h"
+#include "core/storage/outcome.h"
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
+#include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
@@ -185,6 +189,51 @@ TEST_F(EditBesideTest, AllKindsAreCarriedOut) {
   map_->EditsWait(half);
   EXPECT_THAT(AwaitAnswer(unreadable), StatusIs(absl::StatusCode::kDataLoss, ::testing::_));
   EXPECT_THAT(AwaitAnswer(half), StatusIs(absl::StatusCode::kDataLoss, ::testing::_));
+}
+
+// Whoever knows a later number of the owner's than the job's is told of one that is later still, at
+// either; and nobody by a job that was given to another.
+TEST_F(EditBesideTest, WhatAJobPublishesBesideTheOwnerHeTellsToo) {
+  const auto give = [this](const std::string& run_by) {
+    JobInfo job;
+    job.id = 1;
+    job.kind = std::string(kCompleteJob);
+    job.state = JobState::kRunning;
+    job.parameters[kRunBy] = run_by;
+    StorageWriter& writer = beside_->writer();
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&] { return writer.PutJob(job); }));
+  };
+  give("other/1");
+  STRATA_ASSERT_OK_AND_ASSIGN(auto storage, other_->OpenToWork(kMapName, 1, "other/1"));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const std::unique_ptr<MapCore> core,
+      MapCore::OpenBeside(kMapName,
+                          {std::move(storage), {}},
+                          OptionsOfOne(),
+                          std::make_shared<CacheBudget>(OptionsOfOne().cache_bytes)));
+  const auto publish = [&core](bool inferred) {
+    return core->Publish({}, {}, true, [&](StorageWriter&) {
+      if (inferred) core->NoteInferred();
+      return absl::OkStatus();
+    });
+  };
+  STRATA_ASSERT_OK(publish(false));
+  EXPECT_EQ(core->asked_to_tell(), 0U);
+  STRATA_ASSERT_OK(publish(true));
+  const std::uint64_t asked = core->asked_to_tell();
+  EXPECT_GT(asked, 0U);
+  STRATA_ASSERT_OK(map_->worker().Execute(
+      Stop(), [](Integrator& integrator) { return integrator.SetPose(kScan, PoseAt(3.0, 1.0)); }));
+  const std::uint64_t known = map_->core().changes().last();
+  EXPECT_GT(known, core->changes().last());
+  map_->EditsWait(asked);
+  STRATA_EXPECT_OK(AwaitAnswer(asked));
+  EXPECT_GT(map_->core().changes().inferred(), known);
+  STRATA_ASSERT_OK_AND_ASSIGN(const StoredChanges stored, reader_->ListChanges(known));
+  EXPECT_GT(ChangesOf(stored, reader_->GetClock()->commit_sequence).inferred, known);
+  give("third/2");
+  EXPECT_TRUE(MustBeOpenedAnew(publish(true)));
+  EXPECT_EQ(reader_->LastEdit().value_or(9), 0U);
 }
 
 // Withdrawn while it was carried out, say.

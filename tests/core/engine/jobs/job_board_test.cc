@@ -42,9 +42,10 @@ class JobBoardTest : public ::testing::Test {
   }
   void TearDown() override { Close(); }
 
-  void Open() {
+  void Open(bool works = true) {
     EngineOptions options;
     options.directory = directory_.path();
+    options.works = works;
     STRATA_ASSERT_OK_AND_ASSIGN(
         core_, MapCore::Open("map", file_, options, std::make_shared<CacheBudget>(1 << 20)));
     STRATA_ASSERT_OK_AND_ASSIGN(quarantine_, Quarantine::Open(*core_));
@@ -327,6 +328,37 @@ TEST_F(JobBoardTest, AJobThatAnotherEngineRunsIsShownAndLeftToIt) {
   EXPECT_EQ(board_->NextId(), second.id);
   STRATA_EXPECT_OK(RunOne());
   EXPECT_EQ(board_->Get(second.id)->state, JobState::kSucceeded);
+}
+
+// Also where its owner has seen nothing of the run; what was cancelled meanwhile is not applied.
+TEST_F(JobBoardTest, AProposalOfAWorkerIsAppliedByWhoHasTheMap) {
+  Close();
+  Open(/*works=*/false);
+  const std::unique_ptr<MapStorage> beside = Beside();
+  StorageWriter& writer = beside->writer();
+  for (const bool told : {false, true}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job, board_->Start(Stop(), "a", "optimize", {}));
+    EXPECT_FALSE(board_->NextId().has_value());
+    STRATA_ASSERT_OK(writer.Commit(Durability::kFull, [&] {
+      const auto propose = [&](JobInfo& now, StorageWriter&) {
+        if (told) TellToEnd(now);
+        JobResult result;
+        result.accepted = true;
+        result.message = "found";
+        EndJob(now, absl::OkStatus(), result);
+        return absl::OkStatus();
+      };
+      return ChangeStoredJob(writer, job.id, propose).status();
+    }));
+    EXPECT_THAT(board_->TakeIn(), testing::IsOkAndHolds(true));
+    EXPECT_EQ(board_->NextId(), job.id);
+    STRATA_EXPECT_OK(Run([](const JobInfo& now, JobContext& context) {
+      EXPECT_TRUE(IsAccepted(now));
+      EXPECT_EQ(now.message, "found");
+      return context.stop().status();
+    }));
+    EXPECT_EQ(board_->Get(job.id)->state, told ? JobState::kCancelled : JobState::kSucceeded);
+  }
 }
 
 TEST_F(JobBoardTest, AJobWhoseEngineIsGoneWaitsAgainUntilItWasTooOften) {

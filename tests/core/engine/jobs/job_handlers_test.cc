@@ -28,5 +28,20 @@ TEST(JobHandlersTest, EveryKindHasOneAndNothingElseHas) {
               testing::StatusIs(absl::StatusCode::kInvalidArgument, ::testing::HasSubstr("dance")));
 }
 
+// But what is proposed is applied by who has the map.
+TEST(JobHandlersTest, WorkersRunWhatLeavesTilesAlone) {
+  std::vector<absl::string_view> here;
+  for (const JobKind& kind : JobKinds()) {
+    JobInfo job;
+    job.kind = std::string(kind.name);
+    EXPECT_EQ(RunsAnywhere(job), RunsAnywhere(kind.name));
+    if (!RunsAnywhere(job)) here.push_back(kind.name);
+    job.parameters[kAccepted] = "1";
+    EXPECT_FALSE(RunsAnywhere(job)) << kind.name;
+  }
+  EXPECT_THAT(here, ::testing::ElementsAre("rebuild", "revert", "classify", "fade"));
+  EXPECT_FALSE(RunsAnywhere("dance"));
+}
+
 }  // namespace
 }  // namespace strata
