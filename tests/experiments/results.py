@@ -21,7 +21,7 @@ FILE = pathlib.Path(__file__).with_name("RESULTS.md")
 POSES = ("core/posegraph", "core/planes", "core/registration")
 LABELS = ("core/classification",)
 PLANES_SEED = 1105530  # drawn after the last change of what it judges
-EXPLORE_SEED = 18755724  # so was this one
+EXPLORE_SEED = 22062911  # so was this one
 
 # name: (title, command, sources that it measures)
 RESULTS = {
