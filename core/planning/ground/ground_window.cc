@@ -31,7 +31,7 @@ GroundWindow::GroundWindow(const TileNeighbourhood& tiles,
 }
 
 // Every one has a top of its deck to the west or to the south. What lies below it as a deck is
-// thick is its underside.
+// thick, and over a floor, is its underside; the ground between two posts is not.
 void GroundWindow::FindUnseenDecks() {
   const auto column = [this](int cell) {
     return std::span<const WindowSurface>(surfaces_.data() + first_[cell],
@@ -58,7 +58,10 @@ void GroundWindow::FindUnseenDecks() {
   for (const auto& [cell, z_m] : unseen_decks_) {
     for (std::uint32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
       const float below_m = z_m - surfaces_[i].z_m;
-      if (below_m >= kLeastUnseenDropM && below_m <= kMaxDeckM) surfaces_[i].weight = 0.0F;
+      const bool over_floor = surfaces_[first_[cell]].z_m < surfaces_[i].z_m - kMaxDeckM;
+      if (over_floor && below_m >= kLeastUnseenDropM && below_m <= kMaxDeckM) {
+        surfaces_[i].weight = 0.0F;
+      }
     }
   }
 }

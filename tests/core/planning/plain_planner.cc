@@ -49,7 +49,10 @@ PlainPlanner::PlainPlanner(const DrawnMap& map, const RobotProfile& profile, dou
   std::vector<Patch*> undersides;
   for (Patch& patch : patches_) {
     for (const double deck : UnseenDecks(patch.cell)) {
-      if (patch.z <= deck - 0.25 && patch.z >= deck - 1.0) undersides.push_back(&patch);
+      const bool over_floor = patches_[columns_[patch.cell].front()].z < patch.z - 1.0;
+      if (over_floor && patch.z <= deck - 0.25 && patch.z >= deck - 1.0) {
+        undersides.push_back(&patch);
+      }
     }
   }
   for (Patch* patch : undersides) patch->underside = true;
