@@ -19,16 +19,17 @@
 namespace strata {
 namespace {
 
-// The surface around a point is judged in cubes of this edge [m], and is none where points spread
-// more about it [m].
-constexpr double kCubeM = 1.0;
+// The surface around a point is judged in cubes of the first of these edges [m], and is none where
+// points spread more about it [m]. Of a ceiling that beams of a sparse scan draw lines on, a few
+// metres apart, a cube of 1 m holds one line: the larger ones are for what the smaller leave open.
+constexpr std::array kCubesM = {1.0, 2.0, 4.0};
 constexpr double kMaxSpreadM = 0.05;
 constexpr int kMinSurfacePoints = 4;
 // Of the normal to the vertical, as a cosine: what is level, and what leans too much to be.
 constexpr double kLevel = 0.9;
 // A ceiling shows in layers of this height [m] with as many points as this.
 constexpr double kCeilingLayerM = 0.25;
-constexpr int kMinCeilingPoints = 50;
+constexpr int kMinCeilingPoints = 20;
 
 // Moments of points, from the first of them.
 struct Moments {
@@ -78,53 +79,74 @@ class Ceilings {
   HashMap<int, int> counts_;
 };
 
-// Horizontal patches above the sensor, from it, and the cubes that they lie in.
+// Horizontal patches above the sensor, from it.
 class Overhead {
  public:
   explicit Overhead(const Eigen::Vector3d& up) : up_(up) {}
 
   void Add(std::uint32_t patch, const Eigen::Vector3f& p) {
-    const auto number = static_cast<std::uint32_t>(cubes_.size());
-    const std::uint32_t cube = numbers_.try_emplace(CubeOf(p), number).first->second;
-    if (cube == number) cubes_.emplace_back();
-    cubes_[cube].Add(p.cast<double>());
-    points_.push_back({patch, cube, static_cast<float>(up_.dot(p.cast<double>()))});
+    points_.push_back({patch, p, Side::kUnknown});
   }
 
-  void Judge(std::vector<Side>& sides) const {
-    std::vector<Side> of_cubes;
-    of_cubes.reserve(cubes_.size());
-    for (const Moments& moments : cubes_) of_cubes.push_back(SideOf(moments, up_));
+  void Judge(std::vector<Side>& sides) {
+    for (const double cube_m : kCubesM) JudgeCubes(cube_m);
     Ceilings ceilings;
     for (const Point& point : points_) {
-      if (of_cubes[point.cube] == Side::kUnderside) ceilings.Add(point.z_m);
+      if (point.side == Side::kUnderside) ceilings.Add(HeightOf(point));
     }
     for (const Point& point : points_) {
-      const Side side = of_cubes[point.cube];
-      const bool doubtful = side == Side::kUnknown && ceilings.MayBeAt(point.z_m);
-      sides[point.patch] = doubtful ? Side::kDoubtful : side;
+      const bool doubtful = point.side == Side::kUnknown && ceilings.MayBeAt(HeightOf(point));
+      sides[point.patch] = doubtful ? Side::kDoubtful : point.side;
     }
   }
 
  private:
+  struct Point {
+    std::uint32_t patch;
+    Eigen::Vector3f p;
+    Side side;
+  };
+
   // 21 bits an axis.
-  static std::uint64_t CubeOf(const Eigen::Vector3f& p) {
+  static std::uint64_t CubeOf(const Eigen::Vector3f& p, double cube_m) {
     std::uint64_t cube = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto at = static_cast<std::int64_t>(std::floor(p[axis] / static_cast<float>(kCubeM)));
+      const auto at = static_cast<std::int64_t>(std::floor(p[axis] / static_cast<float>(cube_m)));
       cube = cube << 21 | (static_cast<std::uint64_t>(at) & 0x1FFFFF);
     }
     return cube;
   }
 
-  struct Point {
-    std::uint32_t patch, cube;
-    float z_m;  // along up_
-  };
+  double HeightOf(const Point& point) const { return up_.dot(point.p.cast<double>()); }
+
+  // Points of which nothing is known yet. A large cube in which they are no plane may hold several
+  // surfaces, and says nothing.
+  void JudgeCubes(double cube_m) {
+    HashMap<std::uint64_t, std::uint32_t> numbers;
+    std::vector<Moments> cubes;
+    std::vector<std::uint32_t> cube_of;
+    for (const Point& point : points_) {
+      if (point.side != Side::kUnknown) continue;
+      const auto number = static_cast<std::uint32_t>(cubes.size());
+      const std::uint32_t cube = numbers.try_emplace(CubeOf(point.p, cube_m), number).first->second;
+      if (cube == number) cubes.emplace_back();
+      cubes[cube].Add(point.p.cast<double>());
+      cube_of.push_back(cube);
+    }
+    std::vector<Side> of_cubes;
+    of_cubes.reserve(cubes.size());
+    for (const Moments& moments : cubes) {
+      const Side side = SideOf(moments, up_);
+      const bool is_open = side == Side::kTop && cube_m > kCubesM.front();
+      of_cubes.push_back(is_open ? Side::kUnknown : side);
+    }
+    std::size_t next = 0;
+    for (Point& point : points_) {
+      if (point.side == Side::kUnknown) point.side = of_cubes[cube_of[next++]];
+    }
+  }
 
   const Eigen::Vector3d up_;
-  HashMap<std::uint64_t, std::uint32_t> numbers_;
-  std::vector<Moments> cubes_;
   std::vector<Point> points_;
 };
 

@@ -21,6 +21,8 @@ constexpr float kMaxSpreadM = 0.06F;
 constexpr float kMinThicknessM = 0.02F;
 constexpr float kMaxThicknessM = 0.3F;
 constexpr int kMinPoints = 4;
+// Of a normal to the vertical, as a cosine.
+constexpr float kLeaning = 0.5F;
 // A trunk or a pole is narrower than as many features of a wall are: it is seen from all around,
 // and the other side of it says where it is.
 constexpr int kWallNeighbours = 32;
@@ -66,6 +68,13 @@ bool IsThinWall(const Faces& faces, const Eigen::Vector3f& normal) {
          faces.other.SpreadAlong(normal) <= kMaxSpreadM;
 }
 
+// True for what was seen from the other side only of something that leans, like the steps of stairs
+// do: neither trunk nor pole.
+bool IsLeaning(const Faces& faces, const Eigen::Vector3f& normal) {
+  return std::abs(normal.z()) > kLeaning && faces.own.n == 0 && faces.other.n >= kMinWallPoints &&
+         faces.other.SpreadAlong(normal) <= kMaxSpreadM;
+}
+
 SurfaceElement ElementAlong(const Eigen::Vector3f& p,
                             const NeighbourMoments& face,
                             const Eigen::Vector3f& normal) {
@@ -95,6 +104,7 @@ Face FaceTowards(const RegistrationTarget& target,
     return Face::kOne;
   }
   const Faces more = FacesAround(target, p, towards, kWallNeighbours, radius_m);
+  if (IsLeaning(more, towards)) return Face::kOther;
   if (!IsWall(more.other, towards)) return Face::kWhole;
   if (faces.own.n == 0) return Face::kOther;
   element = ElementAlong(p, faces.own, towards);

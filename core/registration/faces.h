@@ -15,7 +15,7 @@ namespace strata {
 enum class Face : std::uint8_t {
   kWhole,  // nothing tells two faces apart
   kOne,    // both were seen: this is the one that the scan sees
-  kOther,  // only the other one was seen, and a wall it is: not what the scan sees
+  kOther,  // only the other one was seen, of a wall or of stairs: not what the scan sees
 };
 
 // Looks at the neighbours of the upright feature `index` of a target with upright_sides(). A scan

@@ -38,15 +38,25 @@ bool OppositeSides(const Eigen::Vector3d& p,
 }
 
 // True if the target's surface was seen from nowhere but the other side: a deck's underside by all
-// who drove below it, say. Beams of a sparse scan draw lines on that which look like tops.
+// who drove below it, say, or by those who saw that place. Beams of a sparse scan draw lines on it
+// which look like tops.
 bool IsOtherSide(const SurfaceElement& q,
+                 FeatureClass c,
+                 std::uint32_t index,
                  const Eigen::Vector3f& normal_source,
                  const Eigen::Vector3d& sensor,
                  const RegistrationTarget& target) {
   if (target.sensors().empty()) return false;
-  const Eigen::Vector3f& normal = q.normal.isZero() ? normal_source : q.normal;
+  const Eigen::Vector3d point = q.point.cast<double>();
+  const Eigen::Vector3d normal = (q.normal.isZero() ? normal_source : q.normal).cast<double>();
+  if (c == FeatureClass::kTraversable && !target.toward_below().empty()) {
+    const Eigen::Vector3f& toward = target.toward_below()[index];
+    if (!toward.isZero()) {
+      return OppositeSides(point, normal, sensor, point + toward.cast<double>());
+    }
+  }
   return std::ranges::all_of(target.sensors(), [&](const Eigen::Vector3d& other) {
-    return OppositeSides(q.point.cast<double>(), normal.cast<double>(), sensor, other);
+    return OppositeSides(point, normal, sensor, other);
   });
 }
 
@@ -166,7 +176,7 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
              : TargetSurface{{grid.points()[j], normal}};
     if (surface.is_other_face) continue;
     const SurfaceElement& q = surface.element;
-    if (IsOtherSide(q, normal, sensor, target_)) continue;
+    if (IsOtherSide(q, sampled.feature_class, j, normal, sensor, target_)) continue;
     const Eigen::Vector3d r = R.transpose() * (q.point.cast<double>() - p_target);
     Eigen::Vector3d normal_p = sampled.element.normal.cast<double>();
     Eigen::Vector3d normal_q = R.transpose() * q.normal.cast<double>();

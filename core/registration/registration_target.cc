@@ -87,7 +87,8 @@ Averages AverageInCubes(const std::vector<Eigen::Vector3f>& points, float cube_m
 // Features of one class in the grids' coordinates, scan after scan.
 struct PlacedPoints {
   std::vector<Eigen::Vector3f> points;
-  std::vector<Eigen::Vector3f> toward;  // unit vectors to their sensors; empty if not asked for
+  // Unit vectors to their sensors, zero for tops that were looked down to; empty if not asked for.
+  std::vector<Eigen::Vector3f> toward;
 };
 
 PlacedPoints PlacePoints(std::span<const PlacedScan> scans,
@@ -110,7 +111,10 @@ PlacedPoints PlacePoints(std::span<const PlacedScan> scans,
       const Eigen::Vector3f moved = R * p + t;
       if (moved.head<2>().squaredNorm() > radius_m2) continue;
       placed.points.push_back(moved);
-      if (with_sensors) placed.toward.push_back((sensor - moved).normalized());
+      if (!with_sensors) continue;
+      const Eigen::Vector3f to_sensor = sensor - moved;
+      const bool is_top = c == FeatureClass::kTraversable && to_sensor.z() >= 0.0F;
+      placed.toward.push_back(is_top ? Eigen::Vector3f::Zero() : to_sensor.normalized());
     }
   }
   return placed;
@@ -139,6 +143,26 @@ std::vector<SeenSides> UprightSidesOf(const PlacedPoints& placed,
   return ordered;
 }
 
+// In the order of a grid.
+std::vector<Eigen::Vector3f> TowardBelow(const PlacedPoints& placed,
+                                         const Averages& averages,
+                                         const std::vector<std::uint32_t>& order) {
+  constexpr float kMinSine = 0.05F;
+  std::vector<Eigen::Vector3f> sums(averages.means.size(), Eigen::Vector3f::Zero());
+  std::vector<bool> seen_from_above(sums.size(), false);
+  for (std::size_t i = 0; i < placed.points.size(); ++i) {
+    const std::uint32_t mean = averages.mean_of[i];
+    if (placed.toward[i].z() > -kMinSine) seen_from_above[mean] = true;
+    sums[mean] += placed.toward[i];
+  }
+  std::vector<Eigen::Vector3f> ordered;
+  ordered.reserve(sums.size());
+  for (const std::uint32_t i : order) {
+    ordered.push_back(seen_from_above[i] ? Eigen::Vector3f::Zero() : sums[i]);
+  }
+  return ordered;
+}
+
 }  // namespace
 
 absl::Status TargetOptions::Validate() const {
@@ -161,7 +185,7 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
   for (int c = 0; c < kFeatureClasses; ++c) {
     const auto feature_class = static_cast<FeatureClass>(c);
     const bool sided =
-        averaged && options.from_one_place && feature_class == FeatureClass::kVertical;
+        averaged && options.from_one_place && feature_class != FeatureClass::kNonTraversable;
     const PlacedPoints placed = PlacePoints(scans, feature_class, origin_, options.radius_m, sided);
     if (!averaged) {
       grids_[c] = std::make_shared<const ColumnGrid>(placed.points, kColumnSizeM);
@@ -171,7 +195,11 @@ RegistrationTarget::RegistrationTarget(std::span<const PlacedScan> scans,
     std::vector<std::uint32_t> order;
     grids_[c] =
         std::make_shared<const ColumnGrid>(averages.means, kColumnSizeM, sided ? &order : nullptr);
-    if (sided) upright_sides_ = UprightSidesOf(placed, averages, order);
+    if (sided && feature_class == FeatureClass::kVertical) {
+      upright_sides_ = UprightSidesOf(placed, averages, order);
+    } else if (sided) {
+      toward_below_ = TowardBelow(placed, averages, order);
+    }
   }
 }
 
@@ -183,7 +211,8 @@ std::size_t RegistrationTarget::size() const {
 
 std::size_t RegistrationTarget::memory_bytes() const {
   std::size_t bytes = sizeof(*this) + upright_sides_.capacity() * sizeof(SeenSides) +
-                      sensors_.capacity() * sizeof(Eigen::Vector3d);
+                      sensors_.capacity() * sizeof(Eigen::Vector3d) +
+                      toward_below_.capacity() * sizeof(Eigen::Vector3f);
   for (const auto& grid : grids_) bytes += grid->memory_bytes();
   return bytes;
 }

@@ -58,6 +58,9 @@ class RegistrationTarget {
   const std::vector<Eigen::Vector3d>& sensors() const { return sensors_; }
   // Of each of grid(kVertical).points() if several scans were averaged; empty otherwise.
   const std::vector<SeenSides>& upright_sides() const { return upright_sides_; }
+  // Of each of grid(kTraversable).points() if several scans were averaged: the sum of the unit
+  // vectors to their sensors where all looked up to it, by 3° or more; else zero. Empty otherwise.
+  const std::vector<Eigen::Vector3f>& toward_below() const { return toward_below_; }
   // Origin of the grids' coordinates, in the target frame.
   const Eigen::Vector3d& origin() const { return origin_; }
   std::size_t size() const;
@@ -67,6 +70,7 @@ class RegistrationTarget {
   std::array<std::shared_ptr<const ColumnGrid>, kFeatureClasses> grids_;  // never null
   std::vector<Eigen::Vector3d> sensors_;
   std::vector<SeenSides> upright_sides_;
+  std::vector<Eigen::Vector3f> toward_below_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 

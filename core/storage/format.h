@@ -7,7 +7,7 @@
 namespace strata {
 
 // Format of the derived tables and of what is in them; any other is dropped and rebuilt.
-inline constexpr std::int32_t kDerivedVersion = 8;
+inline constexpr std::int32_t kDerivedVersion = 9;
 
 }  // namespace strata
 

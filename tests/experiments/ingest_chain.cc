@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
 #include <CLI/CLI.hpp>
 
 #include "core/cloud/sensor_model.h"
@@ -23,6 +24,7 @@
 #include "core/registration/mls_registration.h"
 #include "core/registration/neighbours.h"
 #include "core/registration/umeyama.h"
+#include "core/registration/upright_frame.h"
 #include "core/registration/upright_offsets.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
@@ -38,6 +40,7 @@ struct Settings {
   TargetOptions target;
   NeighbourPolicy policy;
   MlsRegistrationOptions registration;
+  bool from_reference = false;
   bool verbose = false;
   std::string out;
 };
@@ -90,6 +93,16 @@ double AbsoluteTrajectoryError(const std::vector<Pose>& poses, const std::vector
   return FitRigidTransform(x, y).rms_m;
 }
 
+// Median, 90th percentile and largest.
+std::string Spread(std::vector<double> errors_m) {
+  if (errors_m.empty()) return "";
+  std::ranges::sort(errors_m);
+  return absl::StrFormat("steps %.3f / %.3f / %.3f m",
+                         errors_m[errors_m.size() / 2],
+                         errors_m[errors_m.size() * 9 / 10],
+                         errors_m.back());
+}
+
 void WriteTum(const std::filesystem::path& path, const std::vector<Pose>& poses) {
   std::ofstream out(path);
   out.precision(12);
@@ -104,6 +117,7 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
   std::vector<ScanFeatures> features;
   std::vector<Pose> poses;
   std::map<Termination, int> outcomes;
+  std::vector<double> step_errors_m;
   double features_ms = 0.0;
   double target_ms = 0.0;
   double register_ms = 0.0;
@@ -115,20 +129,26 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
   };
   for (std::size_t i = 0; i < recording.clouds.size(); ++i) {
     const double start = now();
+    const PointCloud& cloud = recording.clouds[i];
+    ScanFeatureOptions options = settings.features;
+    options.up = BelievedUp(cloud.points, UpOf(recording.uploaded[i]));
+    options.R_map_scan = UprightTurn(options.up);
     const MlsMap map =
-        BuildMlsMap(recording.clouds[i], Pose::Identity(), SensorModel(), settings.mls, scratch)
+        BuildMlsMap(cloud, Pose(options.R_map_scan), SensorModel(), settings.mls, scratch)
             .value()
             .map;
-    UprightOffsets offsets(map, settings.features.samples_per_metre);
-    offsets.Add(recording.clouds[i].points);
-    features.push_back(ScanFeatures::FromMap(map, settings.features, &offsets));
+    UprightOffsets offsets(map, options.samples_per_metre, options.R_map_scan);
+    offsets.Add(cloud.points);
+    features.push_back(ScanFeatures::FromMap(map, options, &offsets));
     features_ms += now() - start;
     if (i == 0) {
       poses.push_back(recording.uploaded[0]);
       continue;
     }
-    const Pose guess =
-        Normalized(poses.back() * recording.uploaded[i - 1].inverse() * recording.uploaded[i]);
+    const Pose guess = settings.from_reference
+                           ? recording.reference[i]
+                           : Normalized(poses.back() * recording.uploaded[i - 1].inverse() *
+                                        recording.uploaded[i]);
     const double target_start = now();
     std::vector<PlacedScan> placed;
     for (const std::size_t j : SelectNeighbours(poses, guess, settings.policy)) {
@@ -147,11 +167,17 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
                           r.termination == Termination::kMaxIterations ||
                           r.termination == Termination::kDegenerate;
     poses.push_back(accepted ? r.T_target_source : guess);
+    step_errors_m.push_back((recording.reference[i].inverse() * recording.reference[i - 1] *
+                             poses[i - 1].inverse() * poses[i])
+                                .translation()
+                                .norm());
+    if (settings.from_reference) poses.back() = recording.reference[i];
     worst_overlap = std::min(worst_overlap, r.overlap);
     if (settings.verbose) {
       const Pose moved = guess.inverse() * r.T_target_source;
       std::printf(
-          "%6d %-18s scans %zu it %d overlap %.2f rms %.3f moved %.3f m %.3f deg, ref %.3f m %.3f "
+          "%6d %-18s scans %zu it %d overlap %.2f rms %.3f moved %.3f m (%.3f %.3f %.3f) %.3f deg, "
+          "ref %.3f m %.3f "
           "deg\n",
           recording.index[i],
           std::string(ToString(r.termination)).c_str(),
@@ -160,6 +186,9 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
           r.overlap,
           r.rms_m,
           moved.translation().norm(),
+          moved.translation().x(),
+          moved.translation().y(),
+          moved.translation().z(),
           RotationAngleRad(moved) * kDegrees,
           (recording.reference[i - 1].inverse() * recording.reference[i] *
            (poses[i - 1].inverse() * poses[i]).inverse())
@@ -173,14 +202,15 @@ std::vector<Pose> Place(const Recording& recording, const Settings& settings) {
   const double n = static_cast<double>(recording.clouds.size());
   std::printf(
       "%-18s ATE %.4f m (uploaded %.4f m); features %.1f target %.1f register %.1f ms a scan; "
-      "least overlap %.2f;",
+      "least overlap %.2f; %s;",
       recording.name.c_str(),
       AbsoluteTrajectoryError(poses, recording.reference),
       AbsoluteTrajectoryError(recording.uploaded, recording.reference),
       features_ms / n,
       target_ms / n,
       register_ms / n,
-      worst_overlap);
+      worst_overlap,
+      Spread(step_errors_m).c_str());
   for (const auto& [termination, count] : outcomes) {
     std::printf(" %s %d", std::string(ToString(termination)).c_str(), count);
   }
@@ -216,6 +246,14 @@ int Main(int argc, char** argv) {
   CLI::App app("chains of registrations as ingest makes them");
   Settings settings;
   std::string only;
+  std::vector<std::string> folders;
+  app.add_option("folders",
+                 folders,
+                 "recordings (scans/, poses_initial.txt, poses_reference.txt); without, those of "
+                 "STRATA_DATA");
+  app.add_flag("--from-reference",
+               settings.from_reference,
+               "match each scan from where the reference has it to scans that are there, too");
   app.add_option("--only", only, "one recording");
   app.add_option("--out", settings.out, "folder for TUM files");
   app.add_flag("--verbose", settings.verbose, "a line a scan");
@@ -240,6 +278,10 @@ int Main(int argc, char** argv) {
   settings.features.sample_count = settings.registration.max_samples;
   settings.features.neighbours = settings.registration.neighbours;
 
+  for (const std::string& folder : folders) {
+    Place(Load(folder, "poses_initial.txt", "poses_reference.txt"), settings);
+  }
+  if (!folders.empty()) return 0;
   const auto wanted = [&](const std::string& name) { return only.empty() || only == name; };
   if (const auto f = testing::FindData("kitti_city_drive");
       f.has_value() && wanted("kitti_city_drive")) {

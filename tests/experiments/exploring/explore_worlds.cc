@@ -355,8 +355,8 @@ int Main(int argc, char** argv) {
   query.count = 1;
   query.budget_m = 300.0;
   query.sensor_height_m = kSensorHeightM;
-  query.min_bits = 1000.0;
-  query.bits_per_m = 200.0;
+  query.min_bits = 2000.0;
+  query.bits_per_m = 300.0;
   query.sensor.rows = 64;
   query.sensor.columns = 720;
   app.add_option("--seed", seed, "Of the first draw");
