@@ -21,7 +21,7 @@ FILE = pathlib.Path(__file__).with_name("RESULTS.md")
 POSES = ("core/posegraph", "core/planes", "core/registration")
 LABELS = ("core/classification",)
 PLANES_SEED = 1105530  # drawn after the last change of what it judges
-EXPLORE_SEED = 22062911  # so was this one
+EXPLORE_SEED = 70291129  # so was this one
 
 # name: (title, command, sources that it measures)
 RESULTS = {
@@ -66,7 +66,7 @@ RESULTS = {
                        ("core/completion", "core/engine/objects")),
     "stool": ("Thesis, 4.4.2: a piano stool explored by a manipulator", "experiments/explore_stool", ("core/occupancy",)),
     "explore": ("Where to look next, on recorded drives", "experiments/explore", ("core/occupancy",)),
-    "explore_worlds": ("Drawn worlds explored by a robot", f"experiments/explore_worlds --seed {EXPLORE_SEED} --draws 1",
+    "explore_worlds": ("Drawn worlds explored by a robot", f"experiments/explore_worlds --seed {EXPLORE_SEED} --draws 3",
                        ("core/occupancy", "core/planning", "core/engine/plans")),
     "posegraphs": ("Recorded pose graphs", "/usr/bin/python3 tests/experiments/pose_graphs.py --build {build}",
                    ("core/posegraph", "client/formats")),
