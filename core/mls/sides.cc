@@ -24,7 +24,7 @@ namespace {
 // metres apart, a cube of 1 m holds one line: the larger ones are for what the smaller leave open.
 constexpr std::array kCubesM = {1.0, 2.0, 4.0};
 constexpr double kMaxSpreadM = 0.05;
-constexpr int kMinSurfacePoints = 4;
+constexpr int kMinSurfacePoints = 4;  // of the smallest; more of larger ones, like their edge
 // Of the normal to the vertical, as a cosine: what is level, and what leans too much to be.
 constexpr double kLevel = 0.9;
 // A ceiling shows in layers of this height [m] with as many points as this.
@@ -48,8 +48,8 @@ struct Moments {
 
 // Which side of what its points span is seen from the origin. What spans no surface, or one that is
 // not level, is taken for a top: leaves, a hillside, the lines that beams draw on a wall.
-Side SideOf(const Moments& m, const Eigen::Vector3d& up) {
-  if (m.n < kMinSurfacePoints) return Side::kUnknown;
+Side SideOf(const Moments& m, double cube_m, const Eigen::Vector3d& up) {
+  if (m.n < kMinSurfacePoints * cube_m / kCubesM.front()) return Side::kUnknown;
   const Eigen::Vector3d mean = m.sum / m.n;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(m.squares / m.n - mean * mean.transpose());
@@ -136,7 +136,7 @@ class Overhead {
     std::vector<Side> of_cubes;
     of_cubes.reserve(cubes.size());
     for (const Moments& moments : cubes) {
-      const Side side = SideOf(moments, up_);
+      const Side side = SideOf(moments, cube_m, up_);
       const bool is_open = side == Side::kTop && cube_m > kCubesM.front();
       of_cubes.push_back(is_open ? Side::kUnknown : side);
     }

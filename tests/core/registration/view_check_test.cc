@@ -100,9 +100,9 @@ TEST(ViewImageTest, NothingIsSeenThroughWhatIsDoubtful) {
     }
   }
   constexpr float kFar = 8.05F;  // too few there to tell the side of
-  for (int i = 0; i < 12; ++i) {
-    for (float y = -15.0F; y < 15.0F; y += 5.0F) {
-      room.points.emplace_back(kFar + 2.5F * static_cast<float>(i), y, 2.5F);
+  for (int i = 0; i < 20; ++i) {
+    for (float y = -6.0F; y < 6.0F; y += 1.5F) {
+      room.points.emplace_back(kFar + static_cast<float>(i), y, 2.5F);
     }
   }
   const absl::StatusOr<MlsBuildResult> local = BuildMlsMap(room, Pose::Identity(), {}, {});

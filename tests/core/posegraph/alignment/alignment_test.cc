@@ -155,7 +155,7 @@ TEST_F(AlignmentTest, DisturbedPosesComeBack) {
     const Errors errors = ErrorsOf(result.T_map_scan);
     RecordProperty("max_mm", static_cast<int>(1000 * errors.max_m));
     EXPECT_LT(errors.max_m, 0.02);
-    EXPECT_LT(errors.max_rad, 0.003);  // 0.0010 to 0.0027 of six starts
+    EXPECT_LT(errors.max_rad, 0.002);
     EXPECT_TRUE(result.T_map_scan[0].isApprox(yard().truth()[0], 1e-9));  // the gauge
     EXPECT_THAT(result.planes, Not(IsEmpty()));
     EXPECT_THAT(result.rejected, IsEmpty());
