@@ -25,7 +25,7 @@ enum class Side : std::uint8_t {
 // its own. What is not above the sensor is seen from above. Of the horizontal patches above it the
 // planes of cubes of 1 m are judged: those that are level (within 26°) and face the sensor from
 // above it are undersides, all that spans a surface of another kind, or none, is a top. Lines and
-// what is sparse are judged in cubes of 2 m, then 4 m.
+// what is sparse are judged in cubes of 2 m, then 4 m, with four points a metre of edge at least.
 // What lies horizontally farther than `max_range_m` from the map's origin is left out: kUnknown.
 // A pure function of its arguments.
 std::vector<Side> SidesOf(const MlsMap& map,
