@@ -95,7 +95,14 @@ inline constexpr std::array<CopiedTable, 35> kCopiedTables = {{
                   "?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8",
                   "itirttii",
                   "id"),
-    STRATA_COPIED("truth_job_parameter", "job, name, value", "?1, ?2, ?3", "itt", "job, name"),
+    // A copy is run by nobody: what another server runs waits in it.
+    {"truth_job_parameter",
+     "SELECT job, name, value FROM truth_job_parameter WHERE map = $1 AND name <> 'run_by' ORDER "
+     "BY job, name",
+     "INSERT INTO truth_job_parameter (job, name, value) VALUES (?1, ?2, ?3)",
+     "SELECT job, name, value FROM truth_job_parameter WHERE name <> 'run_by' ORDER BY job, name",
+     "COPY truth_job_parameter (map, job, name, value) FROM STDIN (FORMAT binary)",
+     "itt"},
     STRATA_COPIED("truth_job_metric", "job, name, value", "?1, ?2, ?3", "itr", "job, name"),
     STRATA_COPIED("attempt", "kind, id, deaths, under_way", "?1, ?2, ?3, ?4", "iiii", "kind, id"),
     STRATA_COPIED("derived_mls_tile",

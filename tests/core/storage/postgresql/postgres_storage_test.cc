@@ -387,6 +387,35 @@ TEST_F(PostgresStorageTest, TilesOfAnotherFormatAreDropped) {
   EXPECT_FALSE(Reader()->FindSurfaceTile({}, 9)->has_value());
 }
 
+TEST_F(PostgresStorageTest, CopiesAreRunByNobody) {
+  JobInfo job;
+  job.id = 7;
+  job.kind = "objects";
+  job.state = JobState::kRunning;
+  job.parameters = {{"scans", "2"}, {kRunBy, "who lives here/1"}};
+  STRATA_ASSERT_OK(
+      storage_->writer().Commit(Durability::kFull, [&] { return storage_->writer().PutJob(job); }));
+  const TempDir directory;
+  const std::filesystem::path file = directory.path() / "copy.strata";
+  STRATA_ASSERT_OK(Reader()->CopyTo(file, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto copy, OpenSqliteStorage(file, {}));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto reader, copy->NewReader());
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<JobInfo> copied, reader->ListJobs());
+  ASSERT_THAT(copied, ::testing::SizeIs(1));
+  EXPECT_THAT(copied[0].parameters, ::testing::ElementsAre(::testing::Pair("scans", "2")));
+  // Nor where a file says so.
+  STRATA_ASSERT_OK(
+      copy->writer().Commit(Durability::kFull, [&] { return copy->writer().PutJob(job); }));
+  const std::filesystem::path says_so = directory.path() / "says_so.strata";
+  STRATA_ASSERT_OK(reader->CopyTo(says_so, Stop()));
+  STRATA_ASSERT_OK(maps_->Import("imported", says_so, Stop()));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto imported, maps_->Open("imported"));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto there, imported->NewReader());
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::vector<JobInfo> jobs, there->ListJobs());
+  ASSERT_THAT(jobs, ::testing::SizeIs(1));
+  EXPECT_FALSE(jobs[0].parameters.contains(kRunBy));
+}
+
 TEST_F(PostgresStorageTest, TablesThatAreOthersOrNewerAreNotReadAsOurs) {
   STRATA_ASSERT_OK(other_->Execute("CREATE DATABASE strange"));
   STRATA_ASSERT_OK_AND_ASSIGN(PostgresCluster* const cluster, SharedPostgresCluster());
