@@ -19,6 +19,7 @@
 #include "client/sdk/client.h"
 #include "core/common/status.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -137,7 +138,7 @@ TEST_F(StratadTest, AMapAtRestIsPreparedForPlansAndStaysSo) {
     STRATA_ASSERT_OK(db->maps().Create({}, kMap, {}));
     STRATA_ASSERT_OK(Upload(*db, {"robot", 1}));
     STRATA_ASSERT_OK(Upload(*db, {"robot", 60}));
-    const absl::Time deadline = absl::Now() + absl::Minutes(2);
+    const absl::Time deadline = absl::Now() + kPatience;
     do {
       ASSERT_LT(absl::Now(), deadline);
       absl::SleepFor(absl::Milliseconds(100));

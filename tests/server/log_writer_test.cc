@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "tests/support/patience.h"
+
 namespace strata::server {
 namespace {
 
@@ -18,7 +20,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 // A hang, not a slow machine.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 class LogWriterTest : public ::testing::Test {
  protected:
@@ -48,7 +49,7 @@ TEST_F(LogWriterTest, WritesWhatIsLogged) {
   const std::string text = ReadUntil("event=two\n");
   EXPECT_THAT(text, HasSubstr("event=one\n"));
   EXPECT_THAT(text, HasSubstr("log_writer_test.cc:"));
-  EXPECT_LT(writer.stuck(), kPatience);
+  EXPECT_LT(writer.stuck(), testing::kPatience);
 }
 
 TEST_F(LogWriterTest, WhatIsLoggedLastIsWrittenBeforeItEnds) {
@@ -66,7 +67,7 @@ TEST_F(LogWriterTest, WhoLogsDoesNotWaitForWhoReadsAndIsToldOfWhatIsLost) {
     LOG(INFO) << long_line;
   }
   EXPECT_GT(writer.dropped(), 0U);
-  const absl::Time until = absl::Now() + kPatience;
+  const absl::Time until = absl::Now() + testing::kPatience;
   while (writer.stuck() < absl::Milliseconds(200) && absl::Now() < until) {
     absl::SleepFor(absl::Milliseconds(10));
   }

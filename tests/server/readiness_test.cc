@@ -20,6 +20,7 @@
 #include "server/server.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/served_mock.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -30,7 +31,6 @@ using ::testing::ElementsAre;
 using ::testing::Pair;
 
 // A hang, not a slow machine.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 // What was told, in order.
 class Told {
@@ -44,7 +44,7 @@ class Told {
     absl::MutexLock lock(&mutex_);
     const auto enough = [&]()
                             ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return told_.size() >= times; };
-    mutex_.AwaitWithTimeout(absl::Condition(&enough), kPatience);
+    mutex_.AwaitWithTimeout(absl::Condition(&enough), testing::kPatience);
     return told_;
   }
 
@@ -86,7 +86,7 @@ class ReadyServerTest : public ServedMock {
   }
   // What a service's health is at last.
   std::string Await(const std::string& state) {
-    const absl::Time until = absl::Now() + kPatience;
+    const absl::Time until = absl::Now() + testing::kPatience;
     while (Health("strata.v1.Scans") != state && absl::Now() < until) {
       absl::SleepFor(absl::Milliseconds(10));
     }

@@ -20,6 +20,7 @@
 #include "tests/server/raw_call.h"
 #include "tests/server/test_certificates.h"
 #include "tests/support/mock_database.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -145,7 +146,7 @@ TEST_F(TlsTest, AnotherCertificateIsTakenUpWithoutARestart) {
   ClientOptions new_name = Client();
   new_name.tls.server_name = "new.example";
   new_name.connect_timeout = absl::Seconds(1);
-  const absl::Time end = absl::Now() + absl::Seconds(30);
+  const absl::Time end = absl::Now() + testing::kPatience;
   absl::Status status = ListMaps(new_name);
   while (!status.ok() && absl::Now() < end) status = ListMaps(new_name);
   EXPECT_THAT(status, IsOk());

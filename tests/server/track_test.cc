@@ -13,6 +13,7 @@
 #include "strata/v1/posegraph.grpc.pb.h"
 #include "tests/server/scan_sink.h"
 #include "tests/server/served_mock.h"
+#include "tests/support/patience.h"
 
 namespace strata::server {
 namespace {
@@ -134,7 +135,7 @@ TEST_F(TrackTest, EveryStepIsAnsweredOnceItsPointsAreThere) {
   EXPECT_EQ(answers_[2].covariance(7), 0.5);
   EXPECT_EQ(answers_[2].score(), 0.75);
   EXPECT_EQ(answers_[2].epoch(), 4U);
-  const absl::Time until = absl::Now() + absl::Seconds(30);
+  const absl::Time until = absl::Now() + testing::kPatience;
   while (!*ended_ && absl::Now() < until) absl::SleepFor(absl::Milliseconds(1));
   EXPECT_TRUE(*ended_);
 }

@@ -24,6 +24,7 @@
 
 #include "core/common/status.h"
 #include "core/storage/postgresql/connection.h"
+#include "tests/support/patience.h"
 
 namespace strata::testing {
 namespace {
@@ -158,7 +159,7 @@ absl::Status PostgresCluster::Restart() {
   }
   server_ = Spawn(command);
   absl::Status answer;
-  for (const absl::Time end = absl::Now() + absl::Seconds(60); absl::Now() < end;) {
+  for (const absl::Time end = absl::Now() + kPatience; absl::Now() < end;) {
     answer = Connection::Open(Address()).status();
     if (answer.ok()) return answer;
     absl::SleepFor(absl::Milliseconds(20));

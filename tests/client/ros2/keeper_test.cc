@@ -10,6 +10,7 @@
 
 #include "core/common/steady_time.h"
 #include "tests/client/ros2/robot_messages.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
 
@@ -91,7 +92,7 @@ TEST_F(KeeperTest, AFullSpoolIsSaidAndWaitedFor) {
   {
     Keeper keeper(options_, book_, **spool, talk);
     keeper.Put(KeyframeOf(CloudAt(1.0), book_));
-    const absl::Time until = SteadyNow() + absl::Seconds(30);
+    const absl::Time until = SteadyNow() + testing::kPatience;
     while (keeper.room() == Keeper::kMostWaitingBytes && SteadyNow() < until) {
       absl::SleepFor(absl::Milliseconds(1));
     }

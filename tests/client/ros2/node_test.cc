@@ -17,6 +17,7 @@
 #include "client/ros2/listener.h"
 #include "client/ros2/messages.h"
 #include "core/common/steady_time.h"
+#include "tests/support/patience.h"
 #include "tests/support/ros2/fast_node.h"
 #include "tests/support/ros2/ros_cdr.h"
 #include "tests/support/status_matchers.h"
@@ -41,7 +42,7 @@ class NodeTest : public ::testing::Test {
 
   // Follows who publishes until it is so.
   bool Until(const std::function<bool()>& condition) {
-    const absl::Time end = SteadyNow() + absl::Seconds(60);
+    const absl::Time end = SteadyNow() + testing::kPatience;
     while (!condition()) {
       if (SteadyNow() > end) return false;
       node_->Wait(absl::Milliseconds(20));

@@ -13,6 +13,7 @@
 #include "core/common/cache_budget.h"
 #include "core/common/steady_time.h"
 #include "core/common/stop.h"
+#include "tests/support/patience.h"
 
 namespace strata {
 namespace {
@@ -144,7 +145,7 @@ TEST(CacheBudgetTest, WhoAsksForMuchIsNotPassedByWhoAsksLater) {
   much.Request();
   asks_for_much.join();
   EXPECT_EQ(first.code(), absl::StatusCode::kCancelled);
-  const Stop soon(SteadyNow() + absl::Seconds(20));
+  const Stop soon(SteadyNow() + testing::kPatience);
   EXPECT_TRUE(budget.AwaitReserve(20, soon).ok()) << "who left still stands in the way";
 }
 

@@ -26,6 +26,7 @@
 #include "core/engine/repair/rebuild.h"
 #include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -149,7 +150,7 @@ TEST_F(BesideTest, AJobThatWaitsForTheWorkerEndsWhenItIsCancelled) {
   const absl::StatusOr<JobInfo> job = map->jobs().Start(Stop(), "a", kRebuildJob, {});
   map->JobQueued();
   JobInfo last = job.value_or(JobInfo());
-  const Stop patience(SteadyNow() + absl::Seconds(60));
+  const Stop patience(SteadyNow() + kPatience);
   STRATA_EXPECT_OK(map->jobs().Watch(patience, last.id, [&](const JobInfo& now) {
     last = now;
     const bool runs = now.state == JobState::kRunning;

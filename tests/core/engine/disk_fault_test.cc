@@ -17,6 +17,7 @@
 
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/faults/faulty_disk.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -252,7 +253,7 @@ TEST_F(DiskMendedTest, AMapThatCouldNotBeOpenedIsOpenedOnceTheDiskIsWell) {
                 AnyOf(Code::kResourceExhausted, Code::kUnavailable));
     disk_.Mend();
     // It is tried once a second.
-    const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    const absl::Time deadline = absl::Now() + kPatience;
     while (!db().maps().Get({}, map).ok() && absl::Now() < deadline) {
       absl::SleepFor(absl::Milliseconds(20));
     }

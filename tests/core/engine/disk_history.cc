@@ -20,6 +20,7 @@
 #include "core/common/status.h"
 #include "core/world/scan_hash.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/simulator/scene.h"
 #include "tests/support/simulator/simulator.h"
 
@@ -417,7 +418,7 @@ std::string Difference(const WorldState& expected, const WorldState& found) {
 }
 
 absl::Status Settle(api::Database& database, const Hopeless& hopeless) {
-  const absl::Time deadline = absl::Now() + absl::Minutes(1);
+  const absl::Time deadline = absl::Now() + kPatience;
   while (true) {
     STRATA_ASSIGN_OR_RETURN(const MapStats stats, database.maps().Stats({}, kHistoryMap));
     STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, database.jobs().List({}, kHistoryMap));

@@ -25,13 +25,12 @@
 #include "core/world/scan_hash.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/faults/answer_loss.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
 namespace {
-
-constexpr absl::Duration kPatience = absl::Seconds(30);
 
 bool OnPostgresql() {
   const char* store = std::getenv("STRATA_STORE");

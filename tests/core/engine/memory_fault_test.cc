@@ -31,6 +31,7 @@
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/asked.h"
 #include "tests/support/faults/failing_memory.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -73,7 +74,7 @@ class MemoryFaultTest : public EngineTest {
   }
   // A map that is being opened for another call may still say that there was no memory.
   void AwaitJobs() {
-    const absl::Time deadline = absl::Now() + absl::Minutes(2);
+    const absl::Time deadline = absl::Now() + kPatience;
     absl::Status why;
     while (absl::Now() < deadline) {
       const absl::StatusOr<std::vector<JobInfo>> jobs = db().jobs().List({}, kLong);

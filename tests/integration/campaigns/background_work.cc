@@ -24,7 +24,7 @@ namespace {
 
 constexpr char kOtherMap[] = "other";
 constexpr std::uint64_t kLabelledScans = 12;
-constexpr absl::Duration kPatience = absl::Seconds(6);  // with one job
+constexpr absl::Duration kLongestJob = absl::Seconds(6);
 constexpr std::array<const char*, 9> kKinds = {
     "optimize", "fade", "verify", "train", "classify", "planes", "objects", "complete", "rebuild"};
 
@@ -79,7 +79,7 @@ void BackgroundWork::StepJobs(api::Database& db, const api::Call& call) {
   JobInfo last = *job;
   while (!call.stop.requested() && !IsFinal(last.state)) {
     absl::SleepFor(absl::Milliseconds(50));
-    if (absl::Now() - begun > kPatience)
+    if (absl::Now() - begun > kLongestJob)
       db.jobs().Cancel(call, kCampaignMap, job->id).IgnoreError();
     const auto now = db.jobs().Get(call, kCampaignMap, job->id);
     if (now.ok()) last = *now;

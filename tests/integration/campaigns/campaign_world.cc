@@ -15,6 +15,7 @@
 #include "client/sdk/spool.h"
 #include "core/common/status.h"
 #include "tests/integration/campaigns/campaign_scans.h"
+#include "tests/support/patience.h"
 
 namespace strata::testing {
 namespace {
@@ -214,7 +215,7 @@ void CampaignWorld::RetireRobotsAndCheck() {
 
 JobInfo CampaignWorld::RunJob(const std::string& kind) {
   JobInfo last;
-  const absl::Time end = absl::Now() + absl::Minutes(1);
+  const absl::Time end = absl::Now() + kPatience;
   auto job = db().jobs().Start({}, kCampaignMap, kind, {});
   // A server may not know yet that its database is back; started twice it does no harm.
   while (absl::IsUnavailable(job.status()) && absl::Now() < end) {

@@ -19,14 +19,14 @@
 namespace strata::testing {
 namespace {
 
-constexpr absl::Duration kPatience = absl::Seconds(3);  // with a server that is frozen
+constexpr absl::Duration kLongestCall = absl::Seconds(3);  // with a server that is frozen
 constexpr absl::Duration kPause = absl::Milliseconds(30);
 constexpr absl::Duration kPauseInFetch = absl::Milliseconds(5);
 constexpr double kSamePose = 1e-12;
 
 api::Call Patient() {
   api::Call call;
-  call.stop = Stop(SteadyNow() + kPatience);
+  call.stop = Stop(SteadyNow() + kLongestCall);
   return call;
 }
 

@@ -26,6 +26,7 @@
 #include "core/storage/postgresql/store_check.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
@@ -73,7 +74,7 @@ absl::Status PutNumbered(api::Database& db, std::uint64_t sequence) {
 }
 
 absl::StatusOr<MapStats> AfterAll(api::Database& db) {
-  const absl::Time end = absl::Now() + absl::Seconds(60);
+  const absl::Time end = absl::Now() + kPatience;
   while (true) {
     STRATA_ASSIGN_OR_RETURN(MapStats stats, db.maps().Stats({}, kMap));
     if (stats.scans_pending == 0) return stats;

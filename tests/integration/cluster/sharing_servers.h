@@ -25,6 +25,7 @@
 #include "core/common/stop.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/integration/stratad_process.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 #include "tests/support/temp_dir.h"
@@ -32,7 +33,6 @@
 namespace strata::testing {
 
 inline constexpr char kShared[] = "shared";
-inline constexpr absl::Duration kPatience = absl::Minutes(3);
 
 class SharingServer {
  public:

@@ -13,6 +13,7 @@
 
 #include "tests/support/bag_writer.h"
 #include "tests/support/paths.h"
+#include "tests/support/patience.h"
 #include "tests/support/ros2/ros_cdr.h"
 #include "tests/support/simulator/worlds.h"
 #include "tests/support/status_matchers.h"
@@ -38,7 +39,7 @@ std::size_t CountIntegrated(const std::map<std::int64_t, Stored>& scans) {
 }  // namespace
 
 bool WaitFor(const std::function<bool()>& condition) {
-  const absl::Time until = SteadyNow() + absl::Seconds(90);
+  const absl::Time until = SteadyNow() + kPatience;
   while (!condition()) {
     if (SteadyNow() > until) return false;
     absl::SleepFor(absl::Milliseconds(200));

@@ -9,12 +9,12 @@
 #include "core/common/blocking.h"
 #include "server/rpc/executor.h"
 #include "tests/support/faults/failing_memory.h"
+#include "tests/support/patience.h"
 
 namespace strata::server {
 namespace {
 
 // A hang, not a slow machine.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 TEST(ExecutorMemoryTest, WaitsBeginAndEndWithoutMemory) {
   for (const bool in_turn : {false, true}) {
@@ -31,10 +31,10 @@ TEST(ExecutorMemoryTest, WaitsBeginAndEndWithoutMemory) {
       const BlockingScope again(in_turn);
       ended.Notify();
     });
-    ASSERT_TRUE(waits.WaitForNotificationWithTimeout(kPatience));
+    ASSERT_TRUE(waits.WaitForNotificationWithTimeout(testing::kPatience));
     const testing::FailingMemory none(0, std::numeric_limits<std::int64_t>::max());
     go_on.Notify();
-    EXPECT_TRUE(ended.WaitForNotificationWithTimeout(kPatience));
+    EXPECT_TRUE(ended.WaitForNotificationWithTimeout(testing::kPatience));
   }
 }
 

@@ -14,12 +14,12 @@
 #include <gtest/gtest.h>
 
 #include "core/common/blocking.h"
+#include "tests/support/patience.h"
 
 namespace strata::server {
 namespace {
 
 // A hang, not a slow machine.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 TEST(ExecutorTest, RunsTheTasksOfAClientInTheirOrder) {
   std::vector<int> order;
@@ -39,7 +39,7 @@ TEST(ExecutorTest, AClientThatHoldsEveryPlaceKeepsNobodyWaiting) {
     executor.Submit("hostile", [&over] { over.WaitForNotification(); });
   }
   executor.Submit("healthy", [&answered] { answered.Notify(); });
-  EXPECT_TRUE(answered.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(answered.WaitForNotificationWithTimeout(testing::kPatience));
   EXPECT_EQ(executor.numbers().queued, 48U);
   over.Notify();
 }
@@ -71,7 +71,7 @@ TEST(ExecutorTest, ATaskThatBlocksGivesItsPlaceBack) {
     });
   }
   executor.Submit("robot", [&reached] { reached.Notify(); });
-  EXPECT_TRUE(reached.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(reached.WaitForNotificationWithTimeout(testing::kPatience));
 }
 
 TEST(ExecutorTest, OneClientsBlockedTasksAreBounded) {
@@ -86,8 +86,8 @@ TEST(ExecutorTest, OneClientsBlockedTasksAreBounded) {
   }
   absl::Notification answered;
   executor.Submit("healthy", [&answered] { answered.Notify(); });
-  EXPECT_TRUE(answered.WaitForNotificationWithTimeout(kPatience));
-  const absl::Time until = absl::Now() + kPatience;
+  EXPECT_TRUE(answered.WaitForNotificationWithTimeout(testing::kPatience));
+  const absl::Time until = absl::Now() + testing::kPatience;
   while (executor.numbers().blocked < kMost && absl::Now() < until) {
     absl::SleepFor(absl::Milliseconds(1));
   }

@@ -20,6 +20,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::server {
@@ -30,7 +31,6 @@ using ::strata::testing::StatusIs;
 using ::testing::HasSubstr;
 
 // A hang, not a slow machine.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 // A connection to a port of 127.0.0.1.
 class Peer {
@@ -68,7 +68,7 @@ TEST(ListenerTest, HandsConnectionsOnAndTellsItsPort) {
     taken.Notify();
     return true;
   });
-  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(testing::kPatience));
   EXPECT_TRUE(early.Ended());
   EXPECT_EQ(listener->refused(), 0U);
   EXPECT_EQ(listener->since_refused(), absl::InfiniteDuration());
@@ -85,7 +85,7 @@ TEST(ListenerTest, WhatIsNotTakenIsOfferedAgainOrClosedAtTheEnd) {
     return true;
   });
   const Peer peer(listener->port());
-  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(testing::kPatience));
   EXPECT_TRUE(peer.Ended());
   const Peer never(listener->port());
   while (offers < 5) absl::SleepFor(absl::Milliseconds(1));
@@ -102,7 +102,7 @@ TEST(ListenerTest, ANameMayHaveSeveralAddresses) {
     return true;
   });
   const Peer peer(listener->port());
-  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(taken.WaitForNotificationWithTimeout(testing::kPatience));
 }
 
 TEST(ListenerTest, WhatCannotBeListenedOnIsSaid) {
@@ -131,7 +131,7 @@ TEST(ListenerTest, AQuarterOfTheFilesStaysForOthers) {
     });
     // Both ends are files of this process, so a peer takes a number, too; it waits for its other
     // end, or slow listeners find nothing but numbers of peers.
-    const absl::Time until = absl::Now() + kPatience;
+    const absl::Time until = absl::Now() + testing::kPatience;
     while (listener->refused() == 0 && absl::Now() < until) {
       peers.emplace_back(listener->port());
       while (taken + listener->refused() < peers.size() && absl::Now() < until) {
@@ -139,7 +139,7 @@ TEST(ListenerTest, AQuarterOfTheFilesStaysForOthers) {
       }
     }
     EXPECT_GT(listener->refused(), 0U);
-    EXPECT_LT(listener->since_refused(), kPatience);
+    EXPECT_LT(listener->since_refused(), testing::kPatience);
     EXPECT_GT(taken, 100U);
     EXPECT_LE(highest, 300);
     listener->Close();

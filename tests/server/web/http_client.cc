@@ -72,7 +72,8 @@ bool HttpConnection::Ask(const std::string& verb,
 
 bool HttpConnection::Receive() {
   pollfd waited{.fd = socket_, .events = POLLIN, .revents = 0};
-  if (poll(&waited, 1, static_cast<int>(absl::ToInt64Milliseconds(kPatience))) != 1) return false;
+  if (poll(&waited, 1, static_cast<int>(absl::ToInt64Milliseconds(testing::kPatience))) != 1)
+    return false;
   std::array<char, 65536> piece{};
   const ssize_t count = recv(socket_, piece.data(), piece.size(), 0);
   if (count <= 0) return false;

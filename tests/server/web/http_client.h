@@ -10,6 +10,8 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "tests/support/patience.h"
+
 namespace strata::server::web {
 
 using Headers = std::vector<std::pair<std::string, std::string>>;
@@ -22,7 +24,6 @@ struct HttpAnswer {
 
 // How long a test waits for what is to come. No promise of the server's, which is faster, but
 // longer than a loaded machine stands still.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 // One connection, blocking.
 class HttpConnection {
@@ -47,7 +48,7 @@ class HttpConnection {
   // comes.
   std::string TakeUntil(absl::string_view text);
   // Whether the other side closes within `patience`.
-  bool IsClosed(absl::Duration patience = kPatience);
+  bool IsClosed(absl::Duration patience = testing::kPatience);
 
  private:
   // False: nothing came, or the end.

@@ -23,6 +23,7 @@
 #include "tests/server/served_mock.h"
 #include "tests/server/test_certificates.h"
 #include "tests/server/web/http_client.h"
+#include "tests/support/patience.h"
 #include "tests/support/temp_dir.h"
 
 namespace strata::server::web {
@@ -430,7 +431,7 @@ TEST_F(WebServerTest, AClosedTabFreesItsStream) {
   }
   // Now another may.
   std::string said;
-  const absl::Time until = absl::Now() + kPatience;
+  const absl::Time until = absl::Now() + testing::kPatience;
   while (absl::Now() < until && said.find("commit_sequence") == std::string::npos) {
     HttpConnection next(url_);
     said = watch(next, "}");
@@ -451,9 +452,9 @@ TEST_F(WebServerTest, AClosedConnectionEndsTheSearchItAskedFor) {
   {
     HttpConnection connection(url_);
     connection.Ask("POST", kGet, kJson, R"({"name":"campus"})");
-    ASSERT_TRUE(begun.WaitForNotificationWithTimeout(kPatience));
+    ASSERT_TRUE(begun.WaitForNotificationWithTimeout(testing::kPatience));
   }
-  EXPECT_TRUE(stopped.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_TRUE(stopped.WaitForNotificationWithTimeout(testing::kPatience));
 }
 
 TEST_F(WebServerTest, HugeBodiesAndHeadersAreRefusedBeforeTheyAreRead) {
@@ -510,7 +511,7 @@ TEST_F(WebServerTest, AnswersThatNobodyTakesAreBounded) {
   // nothing then.
   std::vector<std::unique_ptr<HttpConnection>> idle;
   HttpAnswer refused;
-  for (const absl::Time until = absl::Now() + kPatience;
+  for (const absl::Time until = absl::Now() + testing::kPatience;
        refused.status != 429 && absl::Now() < until;) {
     idle.push_back(std::make_unique<HttpConnection>(url_, 4096));
     idle.back()->Ask("GET", "/v1/maps/campus/tiles/0/0/0");
@@ -520,7 +521,7 @@ TEST_F(WebServerTest, AnswersThatNobodyTakesAreBounded) {
   EXPECT_EQ(json::parse(refused.body)["details"][0]["debug"]["reason"], "SERVER_BUSY");
   EXPECT_EQ(Get("/healthz").status, 200);
   idle.clear();
-  const absl::Time until = absl::Now() + kPatience;
+  const absl::Time until = absl::Now() + testing::kPatience;
   int status = 0;
   while (status != 200 && absl::Now() < until) {
     status = Get("/v1/maps/campus/tiles/0/0/0").status;
@@ -543,7 +544,7 @@ TEST_F(WebServerTest, SlowHeadersAndBodiesEnd) {
   const absl::Time begun = absl::Now();
   header.Say("POST /strata.v1.Maps/Get HTTP/1.1\r\nX-Slow: ");
   bool closed = false;
-  while (!closed && absl::Now() - begun < kPatience) {
+  while (!closed && absl::Now() - begun < testing::kPatience) {
     header.Say("x");
     closed = header.IsClosed(absl::Seconds(1));
   }
@@ -600,7 +601,7 @@ TEST_F(WebServerTest, CurlSpeaksToItByTls) {
   // Another certificate is taken up, also one that curl does not know.
   const ::strata::testing::TestAuthority stranger(dir_.path(), "stranger");
   stranger.Issue("server", "maps.example");
-  const absl::Time until = absl::Now() + kPatience;
+  const absl::Time until = absl::Now() + testing::kPatience;
   while (absl::Now() < until && curl(server_->web_url() + "/healthz") == 0) {
     absl::SleepFor(absl::Milliseconds(500));
   }

@@ -30,13 +30,13 @@
 #include "core/common/status.h"
 #include "core/common/steady_time.h"
 #include "core/geometry/pose.h"
+#include "tests/support/patience.h"
 #include "tests/support/ros2/fast_node.h"
 #include "tests/support/ros2/ros_cdr.h"
 
 namespace strata::testing {
 namespace {
 
-constexpr absl::Duration kPatience = absl::Seconds(60);
 constexpr double kHeightM = 1.2;  // of the sensor, as strata-simulate has it
 constexpr int kPosesPerCloud = 5;
 

@@ -11,6 +11,7 @@
 
 #include "core/engine/doors/map.h"
 #include "tests/core/engine/consistency/yard_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -99,7 +100,7 @@ TEST_F(ClosureWatchTest, AMapThatWasClosedOptimizesByItself) {
   for (std::uint64_t k = 1; k <= 2; ++k) Drive("a", 0.0, k, Alignment::kOn);
   Drive("b", 1.0, 1, Alignment::kOn);  // makes the contact
   WaitIntegrated(db());
-  const absl::Time deadline = absl::Now() + absl::Seconds(60);
+  const absl::Time deadline = absl::Now() + kPatience;
   while (AutomaticJobs().empty() && absl::Now() < deadline) absl::SleepFor(absl::Milliseconds(10));
   ASSERT_FALSE(AutomaticJobs().empty());
   JobInfo last;

@@ -19,6 +19,7 @@
 #include "core/engine/map/numbers.h"
 #include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -41,7 +42,7 @@ class OpenMapsTest : public EngineTest {
     return fs::exists(MapFile(map).string() + "-wal");
   }
   static bool Becomes(const std::function<bool()>& so) {
-    const absl::Time end = absl::Now() + absl::Seconds(20);
+    const absl::Time end = absl::Now() + kPatience;
     while (!so() && absl::Now() < end) absl::SleepFor(absl::Milliseconds(10));
     return so();
   }

@@ -22,6 +22,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/status_matchers.h"
 
 namespace strata::testing {
@@ -33,7 +34,6 @@ constexpr int kLives = 3;
 constexpr int kRobots = 3;
 constexpr int kScansOfRobot = 4;  // in one life
 // A watcher that was told of nothing for so long will not be told.
-constexpr absl::Duration kPatience = absl::Seconds(60);
 
 int Below(Random& random, int bound) {
   return static_cast<int>(random() % static_cast<std::uint64_t>(bound));

@@ -33,6 +33,7 @@
 #include "core/storage/postgresql/postgres_maps.h"
 #include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 
@@ -105,7 +106,7 @@ class EditBesideTest : public EngineTest {
     return answer.ok() && answer->has_value();
   }
   absl::Status AwaitAnswer(std::uint64_t edit) {
-    const absl::Time end = absl::Now() + absl::Seconds(60);
+    const absl::Time end = absl::Now() + kPatience;
     while (!IsAnswered(edit) && absl::Now() < end) absl::SleepFor(absl::Milliseconds(5));
     const auto answer = reader_->FindAnswer(edit);
     if (!answer.ok()) return answer.status();

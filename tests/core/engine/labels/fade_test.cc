@@ -15,6 +15,7 @@
 #include "core/world/job_arguments.h"
 #include "core/world/job_kinds.h"
 #include "tests/core/engine/engine_fixture.h"
+#include "tests/support/patience.h"
 #include "tests/support/simulator/scene.h"
 #include "tests/support/simulator/simulator.h"
 #include "tests/support/status_matchers.h"
@@ -314,7 +315,7 @@ TEST_F(EngineTest, AMapThatLetsThingsFadeDoesSoByItself) {
     ASSERT_THAT(Upload(db(), HeaderOf({"robot", i}, cloud, StopAt(i)), cloud), IsOk());
   }
   std::vector<JobInfo> fades;
-  const absl::Time deadline = absl::Now() + absl::Seconds(60);
+  const absl::Time deadline = absl::Now() + kPatience;
   while (absl::Now() < deadline && (fades.empty() || !IsFinal(fades[0].state))) {
     absl::SleepFor(absl::Milliseconds(10));
     fades = db().jobs().List({}, kMapName).value();

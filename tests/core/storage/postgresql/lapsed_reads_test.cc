@@ -10,6 +10,7 @@
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
 #include "core/storage/storage.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 
@@ -17,7 +18,6 @@ namespace strata::testing {
 namespace {
 
 constexpr char kMap[] = "lapsed";
-constexpr absl::Duration kPatience = absl::Seconds(30);
 
 TEST(LapsedReadsTest, OfVersionsThatOthersMayCollectAreRefused) {
   const auto cluster = SharedPostgresCluster();

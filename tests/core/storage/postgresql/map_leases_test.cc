@@ -22,6 +22,7 @@
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
 #include "core/storage/storage.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 
@@ -39,8 +40,8 @@ constexpr absl::Duration kLong = absl::Hours(1);
 constexpr absl::Duration kShort = absl::Seconds(3);
 
 // Until `happened`, for at most as long as a machine that is busy could need.
-bool Within30s(absl::FunctionRef<bool()> happened) {
-  const absl::Time end = absl::Now() + absl::Seconds(30);
+bool InTime(absl::FunctionRef<bool()> happened) {
+  const absl::Time end = absl::Now() + kPatience;
   while (!happened()) {
     if (absl::Now() > end) return false;
     absl::SleepFor(absl::Milliseconds(20));
@@ -79,7 +80,7 @@ class MapLeasesTest : public ::testing::Test {
   }
   // As if its owner had been frozen for longer than it lasts.
   void LetLapse() {
-    ASSERT_TRUE(Within30s([this] {
+    ASSERT_TRUE(InTime([this] {
       auto renewed = sql_->Query("SELECT is_called FROM renewals");
       return renewed.ok() && renewed->Next() && renewed->Int(0) != 0;
     }));
@@ -119,7 +120,7 @@ TEST_F(MapLeasesTest, OneHasItAtATime) {
   STRATA_EXPECT_OK(held->CheckHeld());
   // Whoever goes gives it up at once.
   held.reset();
-  EXPECT_TRUE(Within30s([&] { return b.OpenAlone(kName).ok(); }));
+  EXPECT_TRUE(InTime([&] { return b.OpenAlone(kName).ok(); }));
 }
 
 TEST_F(MapLeasesTest, WhoTakesNoMapsIsAlwaysRefused) {
@@ -285,17 +286,17 @@ TEST_F(MapLeasesTest, ItIsRenewedUntilAnotherHasIt) {
   }
   // A row that somebody holds who looks at it is not waited for, and its lease ends meanwhile.
   STRATA_ASSERT_OK(sql_->Execute("BEGIN; SELECT 1 FROM map_lease FOR UPDATE"));
-  EXPECT_TRUE(Within30s([&] { return !held->CheckHeld().ok(); }));
+  EXPECT_TRUE(InTime([&] { return !held->CheckHeld().ok(); }));
   const absl::Status unsure = held->CheckHeld();
   EXPECT_THAT(unsure, StatusIs(absl::StatusCode::kUnavailable, ::testing::_));
   EXPECT_FALSE(MustBeOpenedAnew(unsure));
   STRATA_ASSERT_OK(sql_->Execute("COMMIT"));
-  EXPECT_TRUE(Within30s([&] { return held->CheckHeld().ok(); }));
+  EXPECT_TRUE(InTime([&] { return held->CheckHeld().ok(); }));
   // Taken, it is known here at the next renewal.
   STRATA_ASSERT_OK(
       sql_->Execute("UPDATE map_lease SET token = 1, holder = 'x', server = 'server x', expires = "
                     "clock_timestamp() + interval '1 hour'"));
-  EXPECT_TRUE(Within30s([&] { return MustBeOpenedAnew(held->CheckHeld()); }));
+  EXPECT_TRUE(InTime([&] { return MustBeOpenedAnew(held->CheckHeld()); }));
   EXPECT_EQ(MapOwnerOf(held->CheckHeld()), "server x");
 }
 

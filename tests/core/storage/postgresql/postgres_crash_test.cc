@@ -23,6 +23,7 @@
 #include "core/storage/postgresql/connection.h"
 #include "core/storage/postgresql/postgres_maps.h"
 #include "core/storage/storage.h"
+#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/status_matchers.h"
 
@@ -77,7 +78,7 @@ void Drive(StorageWriter& writer,
 // However slow the disk is.
 void AwaitMore(const std::atomic<std::uint64_t>& acknowledged, std::uint64_t more) {
   const std::uint64_t enough = acknowledged + more;
-  for (const absl::Time end = absl::Now() + absl::Seconds(30); absl::Now() < end;) {
+  for (const absl::Time end = absl::Now() + kPatience; absl::Now() < end;) {
     if (acknowledged >= enough) return;
     absl::SleepFor(absl::Milliseconds(5));
   }
