@@ -43,9 +43,10 @@ struct MlsRegistrationOptions {
   // Converged once the last step is below both.
   double rotation_tolerance_rad = 2e-4;
   double translation_tolerance_m = 1e-3;
-  // Noise of a surface along its normal and reach of a feature within it [m]; in (0, 10].
+  // Noise of a surface along its normal and reach of a feature within it [m]; in (0, 10]. A shorter
+  // reach draws what slides to where the scans overlap most (docs/decisions/0253).
   double normal_sigma_m = 0.03;
-  double tangent_sigma_m = 0.2;
+  double tangent_sigma_m = 0.5;
   // Cauchy kernel on residuals in units of their σ: larger ones count less; in (0, 1e6].
   double robust_width = 3.0;
   double min_overlap = 0.3;  // smaller: kTooLittleOverlap; in [0, 1]
@@ -54,11 +55,11 @@ struct MlsRegistrationOptions {
   double max_translation_m = 5.0;
   double max_rotation_rad = 0.5;
   double min_eigenvalue_ratio = 1e-3;  // see SolveNormalEquations; in [0, 1]
-  // For kPlaneToPlane: a direction that a smaller share of the features holds is left as guessed.
-  // What is seen all around a sensor moves with it: floors slide to where they overlap most. 0 for
-  // an object seen from outside, whose overlap is right. Normals that err hold up to 0.004;
-  // recorded streets, halls and campus hold nearly always more than 0.01. In [0, 1].
-  double min_hold = 0.004;
+  // For kPlaneToPlane: a direction that a smaller share of the features holds, or no more than
+  // normals that err as much as these may by chance, is left as guessed. What is seen all around a
+  // sensor moves with it: floors slide to where they overlap most. 0 for an object seen from
+  // outside, whose overlap is right. In [0, 1].
+  double min_hold = 0.0025;
   // Target side of the surface elements, as ScanFeatureOptions has them for the source.
   int neighbours = 16;
   double neighbour_radius_m = 1.5;

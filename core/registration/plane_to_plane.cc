@@ -86,14 +86,35 @@ void ShareNormals(Eigen::Vector3d& normal_p, Eigen::Vector3d& normal_q) {
   if (normal_q.isZero()) normal_q = normal_p;
 }
 
+// True for normals of two surfaces, though each may err.
+bool AreOfTwo(const Eigen::Vector3d& normal_p, const Eigen::Vector3d& normal_q) {
+  constexpr double kCosine = 0.5;
+  return !normal_p.isZero() && !normal_q.isZero() && std::abs(normal_p.dot(normal_q)) < kCosine;
+}
+
 // True for matches that only count as overlap: two lines of beams, whose places on a surface go
-// with the sensor's, and what may be one.
+// with the sensor's, what may be one, and two surfaces.
 bool SaysNothing(const SampledFeature& feature,
                  const Eigen::Vector3d& normal_p,
                  const Eigen::Vector3d& normal_q,
                  const ScanFeatures& scan) {
   if (feature.feature_class != FeatureClass::kVertical && normal_p.isZero()) return true;
+  if (AreOfTwo(normal_p, normal_q)) return true;
   return (IsLevel(normal_p) || IsLevel(normal_q)) && MayBeStripOnAWall(feature, scan);
+}
+
+// Symmetric part of n_p n_qᵀ, whatever their signs.
+Eigen::Matrix3d Agreed(const Eigen::Vector3d& normal_p, const Eigen::Vector3d& normal_q) {
+  const double half = normal_p.dot(normal_q) < 0.0 ? -0.5 : 0.5;
+  return half * (normal_p * normal_q.transpose() + normal_q * normal_p.transpose());
+}
+
+// Adds w JᵀMJ, J = [−P, I], but for its lower left block.
+void AddUpper(double w, const Eigen::Matrix3d& P, const Eigen::Matrix3d& M, Matrix6d& H) {
+  const Eigen::Matrix3d PM = P * M;
+  H.topLeftCorner<3, 3>() -= w * PM * P;  // Pᵀ = −P
+  H.topRightCorner<3, 3>() += w * PM;
+  H.bottomRightCorner<3, 3>() += w * M;
 }
 
 }  // namespace
@@ -166,14 +187,12 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
   for (std::size_t i = 0; i < n; ++i) {
     const SampledFeature& sampled = source_.sample()[i];
     const Eigen::Vector3d p = sampled.element.point.cast<double>();
-    const ColumnGrid& grid = target_.grid(sampled.feature_class);
     const Eigen::Vector3d p_target = R * p + t;
     const std::uint32_t j = Match(i, p_target.cast<float>(), static_cast<float>(gate_m), fine);
     if (j == ColumnGrid::kNone) continue;
     const Eigen::Vector3f normal = R.cast<float>() * sampled.element.normal;
-    const TargetSurface surface =
-        fine ? SurfaceAt(sampled.feature_class, j, sensor.cast<float>(), normal)
-             : TargetSurface{{grid.points()[j], normal}};
+    const TargetSurface& surface =
+        SurfaceAt(sampled.feature_class, j, sensor.cast<float>(), normal);
     if (surface.is_other_face) continue;
     const SurfaceElement& q = surface.element;
     if (IsOtherSide(q, sampled.feature_class, j, normal, sensor, target_)) continue;
@@ -193,14 +212,15 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     const double error = r.dot(Mr);
     const double w = 1.0 / (1.0 + error * inverse_width2);
     const Eigen::Matrix3d P = Skew(p);
-    const Eigen::Matrix3d PM = P * M;
-    sums.H.topLeftCorner<3, 3>() -= w * PM * P;  // Pᵀ = −P
-    sums.H.topRightCorner<3, 3>() += w * PM;
-    sums.H.bottomRightCorner<3, 3>() += w * M;
+    AddUpper(w, P, M, sums.H);
+    AddUpper(w, P, Agreed(normal_p, normal_q), sums.H_across);
+    if (!normal_p.isZero() && !normal_q.isZero()) {
+      const double cosine = normal_p.dot(normal_q);
+      sums.squared_lean += 1.0 - cosine * cosine;
+      ++sums.leans;
+    }
     sums.b.head<3>() += w * P * Mr;
     sums.b.tail<3>() += w * Mr;
-    sums.H_along.topLeftCorner<3, 3>() -= w * P * P;
-    sums.H_along.topRightCorner<3, 3>() += w * P;
     sums.weight += w;
     sums.squared_error += w * error;
     const double distance = r.dot(normal_q);
@@ -208,10 +228,10 @@ PlaneToPlaneSums PlaneToPlaneMatcher::Linearise(const Pose& T_target_source,
     sums.squared_radius_m2 += p.squaredNorm();
     ++sums.inliers;
   }
-  sums.H.bottomLeftCorner<3, 3>() = sums.H.topRightCorner<3, 3>().transpose();
-  sums.H_along.bottomRightCorner<3, 3>() = sums.weight * Eigen::Matrix3d::Identity();
-  sums.H_along.bottomLeftCorner<3, 3>() = sums.H_along.topRightCorner<3, 3>().transpose();
-  sums.H_along /= 2.0 * tangent2;
+  for (Matrix6d* H : {&sums.H, &sums.H_across}) {
+    H->bottomLeftCorner<3, 3>() = H->topRightCorner<3, 3>().transpose();
+  }
+  sums.H_across /= 2.0 * options_.normal_sigma_m * options_.normal_sigma_m;
   return sums;
 }
 

@@ -22,13 +22,17 @@ struct MlsRegistrationOptions;
 
 // Sums over the matches of one iteration.
 struct PlaneToPlaneSums {
-  Matrix6d H = Matrix6d::Zero();        // Σ w JᵀMJ
-  Vector6d b = Vector6d::Zero();        // Σ w JᵀM r
-  Matrix6d H_along = Matrix6d::Zero();  // Σ w JᵀJ / 2σt²: their share along the surfaces
-  double weight = 0.0;                  // Σ w
-  double squared_error = 0.0;           // Σ w rᵀM r
-  double squared_distance_m2 = 0.0;     // Σ (distance along the normal)²
-  double squared_radius_m2 = 0.0;       // Σ |p|², p in the scan frame
+  Matrix6d H = Matrix6d::Zero();  // Σ w JᵀMJ
+  Vector6d b = Vector6d::Zero();  // Σ w JᵀM r
+  // Σ w JᵀNJ / 2σn², N the symmetric part of ±n_p n_qᵀ: what surfaces hold across themselves where
+  // both sides say so. Normals that only err are not of one mind: they hold nothing on average.
+  Matrix6d H_across = Matrix6d::Zero();
+  double squared_lean = 0.0;         // Σ sin²(n_p, n_q) over matches with both
+  int leans = 0;                     // those
+  double weight = 0.0;               // Σ w
+  double squared_error = 0.0;        // Σ w rᵀM r
+  double squared_distance_m2 = 0.0;  // Σ (distance along the normal)²
+  double squared_radius_m2 = 0.0;    // Σ |p|², p in the scan frame
   int selected = 0;
   int inliers = 0;
 };
@@ -37,8 +41,9 @@ struct PlaneToPlaneSums {
 // T·Exp([ω, v]) its error is rᵀM r, its Jacobian J = [−[p]ₓ, I], and
 //   M = (C_p + Rᵀ C_q R)⁻¹,   C = σt² I − (σt² − σn²) n nᵀ
 // with n the normal of the surface element, so that a surface is known to σn across and to σt
-// along. A line that a beam drew has no normal and takes that of the other side; two of them, and
-// what may be a line on a wall, count as overlap and pull nowhere.
+// along. A line that a beam drew has no normal and takes that of the other side; two of them, what
+// may be a line on a wall, and two surfaces that lean 60° to each other (the end of a corridor that
+// comes into view beside the walls where they ended) count as overlap and pull nowhere.
 class PlaneToPlaneMatcher {
  public:
   // Keeps references.
@@ -46,10 +51,9 @@ class PlaneToPlaneMatcher {
                       const RegistrationTarget& target,
                       const MlsRegistrationOptions& options);
 
-  // `fine` uses `max_samples` and both sides' normals; otherwise `coarse_samples` and only the
-  // source's, which are at hand. Two sides of a thin wall are no match: of a target that is one
-  // scan by where it was seen from, otherwise by FaceTowards(). Normals of the target are computed
-  // at its first match and kept.
+  // `fine` uses `max_samples`, otherwise `coarse_samples`. Two sides of a thin wall are no match:
+  // of a target that is one scan by where it was seen from, otherwise by FaceTowards(). Normals of
+  // the target are computed at its first match and kept.
   PlaneToPlaneSums Linearise(const Pose& T_target_source, double gate_m, bool fine);
 
  private:

@@ -13,15 +13,15 @@ struct NormalEquations {
   Vector6d b = Vector6d::Zero();
 };
 
-// Leaves out the directions that hardly any surface holds. `H_along` is the part of `all.H` that
-// features have along their surfaces: it steadies a registration that surfaces hold in every
-// direction, but where they hold it in none it is all that is left, looks certain as it is a sum of
-// thousands, and pulls towards where the scans overlap most. Directions are the eigenvectors of the
-// rest, rotations weighed as the arc at `radius_m`; one is left out if its eigenvalue is below
-// `least` (Zhang, Kaess, Singh, "On degeneracy of optimization-based state estimation problems",
-// ICRA 2016).
+// Leaves out the directions that hardly any surface holds. `H_across` is what surfaces hold across
+// themselves. What features have along theirs is in `all.H`, too: it steadies a registration that
+// surfaces hold in every direction, but where they hold it in none it is all that is left, looks
+// certain as it is a sum of thousands, and pulls towards where the scans overlap most. Directions
+// are the eigenvectors of `H_across`, rotations weighed as the arc at `radius_m`; one is left out
+// if its eigenvalue is below `least` (Zhang, Kaess, Singh, "On degeneracy of optimization-based
+// state estimation problems", ICRA 2016).
 NormalEquations WithoutSliding(const NormalEquations& all,
-                               const Matrix6d& H_along,
+                               const Matrix6d& H_across,
                                double least,
                                double radius_m);
 

@@ -24,9 +24,9 @@ Matrix6d Held(const Eigen::Vector3d& normals) {
 const Vector6d kPull = (Vector6d() << 1, -2, 3, -4, 5, -6).finished();
 
 TEST(SlidingTest, AFloorSaysNothingOfWhereOnItOneIs) {
-  const Matrix6d H_along = Held({0.25, 0.25, 0.0});
-  const NormalEquations all = {Held({0.0, 0.0, 1.0}) + H_along, kPull};
-  const NormalEquations left = WithoutSliding(all, H_along, 0.5, 2.0);
+  const Matrix6d H_across = Held({0.0, 0.0, 1.0});
+  const NormalEquations all = {H_across + Held({0.25, 0.25, 0.0}), kPull};
+  const NormalEquations left = WithoutSliding(all, H_across, 0.5, 2.0);
   for (const int unheld : {2, 3, 4}) {
     EXPECT_NEAR(left.b[unheld], 0.0, 1e-9) << unheld;
     EXPECT_LT(left.H.row(unheld).norm(), 1e-9) << unheld;
@@ -39,9 +39,9 @@ TEST(SlidingTest, AFloorSaysNothingOfWhereOnItOneIs) {
 }
 
 TEST(SlidingTest, ACorridorIsHeldButAlongItself) {
-  const Matrix6d H_along = Held({0.25, 0.0, 0.0});
-  const NormalEquations all = {Held({0.0, 1.0, 1.0}) + H_along, kPull};
-  const NormalEquations left = WithoutSliding(all, H_along, 0.5, 2.0);
+  const Matrix6d H_across = Held({0.0, 1.0, 1.0});
+  const NormalEquations all = {H_across + Held({0.25, 0.0, 0.0}), kPull};
+  const NormalEquations left = WithoutSliding(all, H_across, 0.5, 2.0);
   EXPECT_NEAR(left.b[3], 0.0, 1e-9);
   EXPECT_LT(left.H.col(3).norm(), 1e-9);
   EXPECT_NEAR(left.b[4], all.b[4], 1e-9);
@@ -49,18 +49,18 @@ TEST(SlidingTest, ACorridorIsHeldButAlongItself) {
 }
 
 TEST(SlidingTest, WhatIsHeldInEveryDirectionStaysAsItIs) {
-  const Matrix6d H_along = Held({0.25, 0.25, 0.0});
-  const NormalEquations all = {Held({0.1, 0.1, 1.0}) + H_along, kPull};
-  EXPECT_EQ(WithoutSliding(all, H_along, 0.5, 2.0).H, all.H);
-  EXPECT_EQ(WithoutSliding(all, all.H, 0.0, 2.0).H, all.H) << "nothing has to be held";
+  const Matrix6d H_across = Held({0.1, 0.1, 1.0});
+  const NormalEquations all = {H_across + Held({0.25, 0.25, 0.0}), kPull};
+  EXPECT_EQ(WithoutSliding(all, H_across, 0.5, 2.0).H, all.H);
+  EXPECT_EQ(WithoutSliding(all, Matrix6d::Zero(), 0.0, 2.0).H, all.H) << "nothing has to be held";
 }
 
 TEST(SlidingTest, TurnsAreWeighedAsTheirArc) {
   Matrix6d H = 100.0 * Matrix6d::Identity();
   H(2, 2) = 4.0;
   const NormalEquations all = {H, kPull};
-  EXPECT_EQ(WithoutSliding(all, Matrix6d::Zero(), 0.9, 2.0).b[2], kPull[2]);
-  EXPECT_NEAR(WithoutSliding(all, Matrix6d::Zero(), 0.9, 3.0).b[2], 0.0, 1e-9);
+  EXPECT_EQ(WithoutSliding(all, H, 0.9, 2.0).b[2], kPull[2]);
+  EXPECT_NEAR(WithoutSliding(all, H, 0.9, 3.0).b[2], 0.0, 1e-9);
 }
 
 }  // namespace

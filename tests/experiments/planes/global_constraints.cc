@@ -74,7 +74,9 @@ struct Setup {
   double initial_gate_m = 1.5;      // of matches: more than the start's error where points are
   double final_gate_m = 0.15;
   double min_overlap = 0.3;
-  double min_hold = 0.0;  // of an object that is seen from outside
+  // Of an object that is seen from outside: where scans overlap says where they are.
+  double min_hold = 0.0;
+  double tangent_sigma_m = 0.2;
   double sigma_m = 0.01;  // of the sensor
   PlaneExtractionOptions extraction;
   SharedPlaneOptions shared_planes;
@@ -111,6 +113,7 @@ Setup FacadeSetup() {
   Setup setup;
   setup.map_cell_m = 0.1;
   setup.min_hold = MlsRegistrationOptions().min_hold;
+  setup.tangent_sigma_m = MlsRegistrationOptions().tangent_sigma_m;
   setup.neighbour_radius_m = 1.5;
   setup.final_gate_m = 0.3;
   setup.sigma_m = 0.02;
@@ -204,6 +207,7 @@ std::vector<Pose> Align(Scans& scans, const std::vector<Pose>& start, Method met
   options.registration.min_overlap = scans.setup().min_overlap;
   options.registration.final_gate_m = scans.setup().final_gate_m;
   options.registration.min_hold = scans.setup().min_hold;
+  options.registration.tangent_sigma_m = scans.setup().tangent_sigma_m;
   options.shared_planes = scans.setup().shared_planes;
   if (method == kThesisLocal || method == kThesisBoth || method == kThesisDirections)
     options.registration.metric = MlsErrorMetric::kPointToPoint;
