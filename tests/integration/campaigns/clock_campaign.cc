@@ -25,10 +25,11 @@
 #include "tests/integration/campaigns/campaign_scans.h"
 #include "tests/integration/numbered_scans.h"
 #include "tests/support/paths.h"
-#include "tests/support/patience.h"
 
 namespace strata::testing {
 namespace {
+
+constexpr absl::Duration kLongest = absl::Seconds(60);  // that anything may take
 
 // The wall clock of the processes that are started while it lives.
 class SetClock {
@@ -126,12 +127,12 @@ void ClockCampaign::GoOnWithHalf(std::uint64_t sequence, bool held, const std::s
 
 void ClockCampaign::CheckWorks(const std::string& after) {
   const auto begin = SteadyNow();
-  if (!world_.AwaitAcknowledged(2 * world_.robots(), kPatience)) {
+  if (!world_.AwaitAcknowledged(2 * world_.robots(), kLongest)) {
     world_.violations().Add(absl::StrCat(after, ": robots are not heard any more"));
   }
   world_.RunJob("verify");
   api::Call patient;
-  patient.stop = Stop(SteadyNow() + kPatience);
+  patient.stop = Stop(SteadyNow() + kLongest);
   world_.violations().Check(after, world_.db().maps().Stats(patient, kCampaignMap).status());
   world_.violations().Check(after, world_.db().maps().History(patient, kCampaignMap).status());
   world_.CheckAcknowledged();
@@ -146,7 +147,7 @@ void ClockCampaign::JumpWhileServing(std::uint64_t jump, const Moment& to) {
   std::thread watch([&] {  // its deadline is far away, whatever the clock says
     if (!job.ok()) return;
     api::Call call;
-    call.stop = Stop(SteadyNow() + kPatience);
+    call.stop = Stop(SteadyNow() + 10 * kLongest);
     const auto take = [](const JobInfo&) { return absl::OkStatus(); };
     world_.violations().Check(after, world_.db().jobs().Watch(call, kCampaignMap, job->id, take));
   });

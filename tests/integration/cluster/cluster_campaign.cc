@@ -21,7 +21,6 @@
 #include "tests/integration/campaigns/campaign_scans.h"
 #include "tests/integration/cluster/cluster_readers.h"
 #include "tests/support/paths.h"
-#include "tests/support/patience.h"
 #include "tests/support/postgres_cluster.h"
 #include "tests/support/simulator/simulator.h"
 
@@ -31,6 +30,8 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 
 constexpr absl::Duration kLease = absl::Seconds(2);
+// Within which somebody takes over and goes on acknowledging.
+constexpr absl::Duration kTakeOver = absl::Minutes(3);
 
 // Commits that need not be durable are not, so that a crash of the database loses them.
 absl::Status KeepRelaxedCommitsBack(const std::string& database) {
@@ -115,13 +116,13 @@ std::size_t ClusterCampaign::DrawServer() {
 
 void ClusterCampaign::AwaitMoment() {
   if (Chance(0.3)) return SleepUpTo(400.0);
-  world_.AwaitAcknowledged(static_cast<std::size_t>(random_.Uniform(1.0, 6.0)), kPatience);
+  world_.AwaitAcknowledged(static_cast<std::size_t>(random_.Uniform(1.0, 6.0)), kTakeOver);
   SleepUpTo(60.0);
 }
 
 void ClusterCampaign::CheckGoesOn() {
   const auto begin = std::chrono::steady_clock::now();
-  if (!world_.AwaitAcknowledged(1, kPatience)) world_.violations().Add("nobody takes over");
+  if (!world_.AwaitAcknowledged(1, kTakeOver)) world_.violations().Add("nobody takes over");
   const double took = Seconds(std::chrono::steady_clock::now() - begin).count();
   numbers_["longest_without_s"] = std::max(numbers_["longest_without_s"], took);
   world_.CheckAcknowledged();
