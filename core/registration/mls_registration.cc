@@ -59,17 +59,6 @@ class RoundSolver {
   PlaneToPlaneMatcher surfaces_;
 };
 
-// The share that normals which err by e, in each of two directions on each of two sides, hold of
-// any direction by chance: of N products of two errors the mean is e² / √N, here three times that.
-// Sixteen neighbours make an element, so that only every sixteenth is independent. Where a scan is
-// far off its pairs are of two surfaces, which says nothing of e: nowhere more than kMostFeigned.
-double FeignedHold(const PlaneToPlaneSums& sums) {
-  constexpr double kMostFeigned = 0.015;
-  if (sums.leans == 0) return 0.0;
-  const double squared_error = sums.squared_lean / (4.0 * sums.leans);
-  return std::min(kMostFeigned, 12.0 * squared_error / std::sqrt(sums.leans));
-}
-
 Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool fine) {
   const PlaneToPlaneSums sums = surfaces_.Linearise(T_local_source, gate_m, fine);
   Round round;
@@ -79,8 +68,10 @@ Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool 
   round.rms_m = std::sqrt(sums.squared_distance_m2 / sums.inliers);
   const double radius_m = std::sqrt(sums.squared_radius_m2 / sums.inliers);
   const double full = sums.weight / (2.0 * options_.normal_sigma_m * options_.normal_sigma_m);
-  const double least =
-      options_.min_hold > 0.0 ? std::max(options_.min_hold, FeignedHold(sums)) : 0.0;
+  const double squared_lean = sums.leans > 0 ? sums.squared_lean / sums.leans : 0.0;
+  const double least = options_.min_hold > 0.0
+                           ? std::max(options_.min_hold, FeignedHold(squared_lean, sums.leans))
+                           : 0.0;
   const NormalEquations held =
       WithoutSliding({sums.H, sums.b}, sums.H_across, least * full, radius_m);
   round.solution = SolveNormalEquations(held.H, held.b, radius_m, options_.min_eigenvalue_ratio);
@@ -184,7 +175,7 @@ RegistrationResult RegisterScan(const ScanFeatures& source,
   };
 
   double gate_m = options.initial_gate_m;
-  // Matches far off are not worth the target's normals: they wait until the others move little.
+  // Matches far off are not worth many samples: those wait until the first move little.
   bool settled = options.metric == MlsErrorMetric::kPointToPoint;
   for (result.iterations = 1;; ++result.iterations) {
     const bool narrow = gate_m <= options.final_gate_m;

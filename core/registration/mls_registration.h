@@ -35,9 +35,8 @@ struct MlsRegistrationOptions {
   double final_gate_m = 0.5;
   double gate_factor = 0.6;  // in [0.1, 1)
   int max_iterations = 30;   // in [1, 1000]
-  // Source features used until the gate is narrow and steps are small, and then (plane-to-plane:
-  // with the target's normals besides the source's). kPointToPoint uses `max_samples` too, or
-  // all features when it is 0. In [0, 1000000].
+  // Source features used until the gate is narrow and steps are small, and then. kPointToPoint uses
+  // `max_samples` alone, or all features when it is 0. In [0, 1000000].
   int coarse_samples = 500;
   int max_samples = 2000;
   // Converged once the last step is below both.

@@ -1,6 +1,7 @@
 #include "core/registration/sliding.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/Eigenvalues>
 
@@ -21,6 +22,16 @@ NormalEquations WithoutSliding(const NormalEquations& all,
   // Into scaled coordinates and back.
   const Matrix6d into = scale.cwiseInverse().asDiagonal() * keep * scale.asDiagonal();
   return {into * all.H * into.transpose(), into * all.b};
+}
+
+double FeignedHold(double squared_lean, int matches) {
+  constexpr double kSigmas = 3.0;
+  constexpr double kMost = 0.015;
+  // Sixteen neighbours make an element, so that only every sixteenth errs by itself.
+  constexpr double kAlike = 16.0;
+  if (matches <= 0) return 0.0;
+  const double squared_error = squared_lean / 4.0;
+  return std::min(kMost, kSigmas * squared_error / std::sqrt(matches / kAlike));
 }
 
 }  // namespace strata

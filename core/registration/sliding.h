@@ -25,6 +25,12 @@ NormalEquations WithoutSliding(const NormalEquations& all,
                                double least,
                                double radius_m);
 
+// The share of `matches` matches that hold a direction by chance only: three times what is expected
+// of the products of two normals' errors, their mean square lean from each other being
+// `squared_lean` (sin², of two directions on two sides). 0 where there are no matches. Where a scan
+// is far off its pairs are of two surfaces, which says nothing of errors: it is at most 0.015.
+double FeignedHold(double squared_lean, int matches);
+
 }  // namespace strata
 
 #endif  // STRATA_CORE_REGISTRATION_SLIDING_H_

@@ -1,6 +1,9 @@
 #include "core/registration/sliding.h"
 
-#include <Eigen/Cholesky>
+#include <random>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 namespace strata {
@@ -61,6 +64,40 @@ TEST(SlidingTest, TurnsAreWeighedAsTheirArc) {
   const NormalEquations all = {H, kPull};
   EXPECT_EQ(WithoutSliding(all, H, 0.9, 2.0).b[2], kPull[2]);
   EXPECT_NEAR(WithoutSliding(all, H, 0.9, 3.0).b[2], 0.0, 1e-9);
+}
+
+// Planted: normals of one plane that err alike in every sixteen, held against each other.
+TEST(SlidingTest, NormalsThatErrFeignAsMuchHoldAsIsSaid) {
+  constexpr double kError = 0.15;
+  constexpr int kElements = 125;
+  constexpr int kMatches = 16 * kElements;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> error(0.0, kError);
+  int beyond = 0;
+  int beyond_a_third = 0;
+  for (int draw = 0; draw < 1000; ++draw) {
+    double held = 0.0;
+    double squared_lean = 0.0;
+    for (int i = 0; i < kElements; ++i) {
+      const Eigen::Vector3d p = Eigen::Vector3d(error(random), error(random), 1.0).normalized();
+      const Eigen::Vector3d q = Eigen::Vector3d(error(random), error(random), 1.0).normalized();
+      held += p.x() * q.x() / kElements;
+      squared_lean += p.cross(q).squaredNorm() / kElements;
+    }
+    const double feigned = FeignedHold(squared_lean, kMatches);
+    beyond += held > feigned ? 1 : 0;
+    beyond_a_third += held > feigned / 3.0 ? 1 : 0;
+  }
+  EXPECT_LE(beyond, 5) << "three sigma";
+  EXPECT_GT(beyond_a_third, 110) << "one sigma: 159 of 1,000";
+  EXPECT_LT(beyond_a_third, 210);
+}
+
+TEST(SlidingTest, FeignedHoldIsBounded) {
+  EXPECT_EQ(FeignedHold(0.0, 0), 0.0);
+  EXPECT_EQ(FeignedHold(0.0, 2000), 0.0) << "normals without an error feign nothing";
+  EXPECT_LE(FeignedHold(0.75, 100), 0.015) << "two surfaces are no errors";
+  EXPECT_GT(FeignedHold(0.02, 500), FeignedHold(0.02, 2000)) << "many err less together";
 }
 
 }  // namespace
