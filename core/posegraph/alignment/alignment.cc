@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
-#include <memory>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -15,54 +14,18 @@
 #include "core/posegraph/alignment/alignment_problem.h"
 #include "core/posegraph/alignment/odometry_noise.h"
 #include "core/posegraph/alignment/parts.h"
-#include "core/posegraph/alignment/scan_chains.h"
+#include "core/posegraph/alignment/scan_matches.h"
 #include "core/posegraph/alignment/shared_surfaces.h"
 #include "core/posegraph/alignment/step_check.h"
 #include "core/posegraph/information.h"
 #include "core/posegraph/solver/optimize_pose_graph.h"
-#include "core/registration/registration_target.h"
 
 namespace strata {
 namespace {
 
-// A scan registered to a chain of scans.
-struct Match {
-  ScanChain chain;
-  bool tried = false;  // not where data are damaged
-  bool good = false;
-  // T_i_scan as measured, i being scans of the chain, nearest first.
-  std::vector<std::pair<std::size_t, Pose>> T_i_scan;
-  Matrix6d information = Matrix6d::Zero();  // of the match, to be shared by all of them
-  // One that may be false, or of a lost scan, and leaves a direction to odometry.
-  bool joins_nothing = false;
-
-  // Of each of T_i_scan.
-  Matrix6d Share() const { return information / static_cast<double>(T_i_scan.size()); }
-};
-
-// Within these of what was measured a match has the same correspondences.
-constexpr double kSamePlaceM = 0.02;
-constexpr double kSamePlaceRad = 0.002;
-// Within these of what was measured when a scan came in, it still holds.
-constexpr double kMeasuredPlaceM = 0.1;
-constexpr double kMeasuredPlaceRad = 0.02;
-// What may be false must look the same at least to this share.
-constexpr double kMinDoubtfulOverlap = 0.5;
-// A match is recorded as relative poses to the nearest few.
-constexpr std::size_t kMaxPartners = 3;
 // Scans that a doubtful step is checked by, on both sides of it.
 constexpr std::size_t kCheckedBefore = 5;
 constexpr std::size_t kCheckedAfter = 3;
-
-bool Acceptable(Termination termination) {
-  return termination == Termination::kConverged || termination == Termination::kMaxIterations ||
-         termination == Termination::kDegenerate;
-}
-
-bool Near(const Pose& a, const Pose& b, double distance_m, double turn_rad) {
-  const Pose difference = a.inverse() * b;
-  return difference.translation().norm() <= distance_m && RotationAngleRad(difference) <= turn_rad;
-}
 
 Pose HalfWay(const Pose& a, const Pose& b) {
   Pose half = a;
@@ -86,18 +49,15 @@ class Alignment {
         options_(options),
         for_each_(for_each),
         stop_(stop),
-        chains_(problem_, options.neighbours),
-        matches_(problem.T_map_scan.size()),
+        matches_(problem_, source, options),
         odometry_(problem.T_map_scan.size(), nullptr),
         lost_(problem.T_map_scan.size(), false),
-        loose_(problem.T_map_scan.size(), false),
         checked_(problem.T_map_scan.size(), false),
         cut_(problem.T_map_scan.size(), false),
         surfaces_(problem, source, options),
         known_by_(problem.T_map_scan.size(), Matrix6d::Zero()),
         slides_(problem.T_map_scan.size(), true) {
     result_.T_map_scan = problem.T_map_scan;
-    FindMeasured();
     for (const RelativePoseTerm& motion : problem_.odometry) odometry_[motion.j] = &motion;
     for (const std::size_t node : problem.lost) lost_[node] = true;
   }
@@ -108,10 +68,10 @@ class Alignment {
     for (int round = 0; round < rounds; ++round) {
       STRATA_RETURN_IF_ERROR(progress(static_cast<double>(round) / rounds));
       std::vector<Pose> last = result_.T_map_scan;
-      const std::vector<bool> loose = loose_;
+      const std::vector<bool> loose = matches_.loose();
       STRATA_RETURN_IF_ERROR(Round());
       bool is_at_rest = false;
-      if (loose_ != loose) {  // what was pooled across such a step is still in force
+      if (matches_.loose() != loose) {  // what was pooled across such a step is still in force
         before_last.clear();
       } else {
         is_at_rest = IsAtRest(last, before_last);
@@ -150,13 +110,6 @@ class Alignment {
       if (!Near(before[k], pose(k), options_.settled_m, options_.settled_rad)) return false;
     }
     return true;
-  }
-
-  void FindMeasured() {
-    measured_.assign(matches_.size(), {});
-    for (const ScanPair& pair : problem_.pairs) {
-      if (pair.measured.has_value()) measured_[pair.j].push_back(&pair);
-    }
   }
 
   // Those that are joined by a match that nobody verified, or that says something else than the
@@ -218,14 +171,13 @@ class Alignment {
     }
     if (!is_any) return false;
     CutBefore(cut_, problem_);
-    chains_ = ScanChains(problem_, options_.neighbours);
-    FindMeasured();
+    matches_.ProblemChanged();
     return true;
   }
 
   absl::Status Round() {
     AlignmentRound round;
-    STRATA_RETURN_IF_ERROR(Register(round));
+    STRATA_RETURN_IF_ERROR(matches_.Register(result_.T_map_scan, for_each_, stop_, round));
     PoseGraphProblem graph = Graph(round);
     STRATA_RETURN_IF_ERROR(surfaces_.Find(result_.T_map_scan, for_each_));
     surfaces_.AddTo(graph);
@@ -287,121 +239,6 @@ class Alignment {
     return {graph.relative[k].i, graph.relative[k].j, std::min(k, problem_.relative.size())};
   }
 
-  absl::Status Register(AlignmentRound& round) {
-    std::vector<std::size_t> registered(matches_.size(), 0);
-    STRATA_RETURN_IF_ERROR(for_each_(matches_.size(), [&](std::size_t node) -> absl::Status {
-      STRATA_RETURN_IF_ERROR(stop_.status());
-      std::vector<Match> before = std::exchange(matches_[node], {});
-      for (ScanChain& chain : chains_.Around(node, result_.T_map_scan, loose_)) {
-        if (chain.own && MeasuredHolds(node)) continue;
-        const auto known = std::find_if(before.begin(), before.end(), [&](const Match& match) {
-          return match.chain.nodes == chain.nodes && StillHolds(node, match);
-        });
-        if (known != before.end()) {
-          matches_[node].push_back(*std::move(known));
-          continue;
-        }
-        STRATA_ASSIGN_OR_RETURN(Match match, RegisterTo(node, std::move(chain)));
-        matches_[node].push_back(std::move(match));
-        ++registered[node];
-      }
-      return absl::OkStatus();
-    }));
-    for (std::size_t node = 0; node < matches_.size(); ++node) {
-      round.registered += registered[node];
-      for (const Match& match : matches_[node]) round.matches += match.good ? 1 : 0;
-    }
-    FindLoose();
-    return absl::OkStatus();
-  }
-
-  // Scans that neither a match to what is behind them nor anything given tells the place of.
-  void FindLoose() {
-    for (std::size_t node = 0; node < matches_.size(); ++node) {
-      const auto has = [&](bool Match::*what) {
-        return std::ranges::any_of(
-            matches_[node], [&](const Match& match) { return match.chain.own && match.*what; });
-      };
-      loose_[node] = has(&Match::tried) && !has(&Match::good) && !MeasuredHolds(node);
-    }
-    for (const RelativePoseTerm& term : problem_.relative) {
-      if (!term.may_be_false) loose_[std::max(term.i, term.j)] = false;
-    }
-  }
-
-  // Whether what was measured when the scan came in still tells where it is on its own way.
-  bool MeasuredHolds(std::size_t node) const {
-    return !measured_[node].empty() &&
-           std::all_of(measured_[node].begin(), measured_[node].end(), [&](const ScanPair* pair) {
-             return Near(pose(pair->i).inverse() * pose(node),
-                         pair->measured->T_i_j,
-                         kMeasuredPlaceM,
-                         kMeasuredPlaceRad);
-           });
-  }
-
-  // The poses are still about what was measured.
-  bool StillHolds(std::size_t node, const Match& match) const {
-    if (!match.good) return false;
-    return std::all_of(match.T_i_scan.begin(), match.T_i_scan.end(), [&](const auto& measured) {
-      return Near(
-          pose(measured.first).inverse() * pose(node), measured.second, kSamePlaceM, kSamePlaceRad);
-    });
-  }
-
-  absl::StatusOr<Match> RegisterTo(std::size_t node, ScanChain chain) {
-    Match match;
-    match.chain = std::move(chain);
-    STRATA_ASSIGN_OR_RETURN(const auto own, FeaturesOf(node));
-    if (own == nullptr) return match;
-    std::vector<std::shared_ptr<const ScanFeatures>> held;
-    std::vector<PlacedScan> placed;
-    std::vector<std::size_t> seen;  // nothing is measured about damaged ones
-    for (const std::size_t i : match.chain.nodes) {
-      STRATA_ASSIGN_OR_RETURN(auto features, FeaturesOf(i));
-      if (features == nullptr) continue;
-      seen.push_back(i);
-      held.push_back(std::move(features));
-      placed.push_back({held.back().get(), pose(i)});
-    }
-    const RegistrationTarget target(placed, {.centre = pose(node).translation()});
-    const RegistrationResult result = RegisterScan(*own, target, pose(node), options_.registration);
-    match.tried = !seen.empty();
-    match.good = Acceptable(result.termination) &&
-                 (!match.chain.may_be_false || result.overlap >= kMinDoubtfulOverlap);
-    if (!match.good) return match;
-    match.information = LoosenedInformation(
-        result.information,
-        IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
-    // A match that may be false is one relative pose, so that it is believed or not as a whole.
-    const std::size_t partners = match.chain.may_be_false ? 1 : kMaxPartners;
-    for (const std::size_t i : Nearest(seen, result.T_target_source, partners)) {
-      match.T_i_scan.push_back({i, Normalized(pose(i).inverse() * result.T_target_source)});
-    }
-    match.joins_nothing = (match.chain.may_be_false || lost_[node]) && Slides(node, match.Share());
-    return match;
-  }
-
-  std::vector<std::size_t> Nearest(std::vector<std::size_t> nodes,
-                                   const Pose& T_map_scan,
-                                   std::size_t count) const {
-    const auto distance = [&](std::size_t i) {
-      return (pose(i).translation() - T_map_scan.translation()).squaredNorm();
-    };
-    std::stable_sort(nodes.begin(), nodes.end(), [&](std::size_t a, std::size_t b) {
-      return distance(a) < distance(b);
-    });
-    nodes.resize(std::min(nodes.size(), count));
-    return nodes;
-  }
-
-  // nullptr: damaged.
-  absl::StatusOr<std::shared_ptr<const ScanFeatures>> FeaturesOf(std::size_t node) {
-    absl::StatusOr<std::shared_ptr<const ScanFeatures>> features = source_.Features(node);
-    if (absl::IsDataLoss(features.status())) return std::shared_ptr<const ScanFeatures>();
-    return features;
-  }
-
   PoseGraphProblem Graph(const AlignmentRound& round) {
     PoseGraphProblem graph;
     graph.T_map_scan = result_.T_map_scan;
@@ -410,10 +247,11 @@ class Alignment {
     graph.relative = problem_.relative;
     graph.relative.reserve(graph.relative.size() + kMaxPartners * round.matches);
     joins_nothing_.assign(graph.relative.size(), false);
-    std::vector<bool> known(matches_.size(), false);
-    std::vector<Matrix6d> information(matches_.size(), Matrix6d::Zero());
-    for (std::size_t node = 0; node < matches_.size(); ++node) {
-      for (const Match& match : matches_[node]) {
+    const std::size_t nodes = graph.T_map_scan.size();
+    std::vector<bool> known(nodes, false);
+    std::vector<Matrix6d> information(nodes, Matrix6d::Zero());
+    for (std::size_t node = 0; node < nodes; ++node) {
+      for (const ScanMatch& match : matches_.of(node)) {
         for (const auto& [i, T_i_scan] : match.T_i_scan) {
           graph.relative.push_back({i, node, T_i_scan, match.Share(), match.chain.may_be_false});
           joins_nothing_.push_back(match.joins_nothing);
@@ -422,17 +260,15 @@ class Alignment {
         known[node] = true;
         information[node] += match.information;
       }
-      if (!MeasuredHolds(node)) continue;
-      for (const ScanPair* pair : measured_[node]) {
-        const Matrix6d loosened = LoosenedInformation(
-            pair->measured->information,
-            IsotropicInformation(options_.registration_sigma_rad, options_.registration_sigma_m));
+      for (const ScanPair* pair : matches_.MeasuredInForce(node, result_.T_map_scan)) {
+        const Matrix6d loosened = LoosenedBy(options_, pair->measured->information);
         graph.relative.push_back(
             {pair->i, node, pair->measured->T_i_j, loosened, pair->may_be_false});
-        joins_nothing_.push_back((pair->may_be_false || lost_[node]) && Slides(node, loosened));
+        const bool may_be_false = pair->may_be_false || lost_[node];
+        joins_nothing_.push_back(may_be_false && Slides(odometry_[node], loosened));
         information[node] += loosened;
+        known[node] = true;
       }
-      known[node] = true;
     }
     measured_end_ = graph.relative.size();
     for (const ScanPair& pair : problem_.pairs) {
@@ -496,15 +332,9 @@ class Alignment {
   bool SlidesBy(std::size_t node, const Matrix6d& information) {
     if (known_by_[node] != information) {
       known_by_[node] = information;
-      slides_[node] = Slides(node, information);
+      slides_[node] = Slides(odometry_[node], information);
     }
     return slides_[node];
-  }
-
-  // Whether what is known of a node leaves a direction to its odometry.
-  bool Slides(std::size_t node, const Matrix6d& information) const {
-    return odometry_[node] != nullptr &&
-           !WhereLess(information, odometry_[node]->information, kLooseShare).isZero();
   }
 
   std::optional<OdometryNoise> NoiseOf(const std::vector<std::size_t>& trajectory) const {
@@ -518,25 +348,9 @@ class Alignment {
 
   // Of what is said of the motion to `node`, as registration has it.
   std::optional<Pose> OdometryError(std::size_t node) const {
-    const std::optional<Pose> T_i_j = MeasuredMotion(odometry_[node]->i, node);
+    const std::optional<Pose> T_i_j = matches_.Motion(odometry_[node]->i, node, result_.T_map_scan);
     if (!T_i_j.has_value()) return std::nullopt;
     return odometry_[node]->T_i_j.inverse() * *T_i_j;
-  }
-
-  // From scan i to scan j, as registration has it.
-  std::optional<Pose> MeasuredMotion(std::size_t i, std::size_t j) const {
-    if (MeasuredHolds(j)) {
-      for (const ScanPair* pair : measured_[j]) {
-        if (pair->i == i) return pair->measured->T_i_j;
-      }
-    }
-    for (const Match& match : matches_[j]) {
-      if (match.chain.may_be_false) continue;
-      for (const auto& [partner, T_i_scan] : match.T_i_scan) {
-        if (partner == i) return T_i_scan;
-      }
-    }
-    return std::nullopt;
   }
 
   // By matches and what is given, as far as it is believed. What may slide agrees with any place:
@@ -598,14 +412,11 @@ class Alignment {
   const AlignmentOptions& options_;
   const ForEach for_each_;
   const Stop& stop_;
-  ScanChains chains_;
-  std::vector<std::vector<Match>> matches_;             // of every node
-  std::vector<std::vector<const ScanPair*>> measured_;  // of every node j
-  std::vector<const RelativePoseTerm*> odometry_;       // of every node j; nullptr: none
-  std::vector<bool> lost_;                              // of every node
-  std::vector<bool> loose_;                             // of every node, in the round before
-  std::vector<bool> checked_;                           // of every node: the step to it
-  std::vector<bool> cut_;  // of every node: the step to it does not hold
+  ScanMatches matches_;
+  std::vector<const RelativePoseTerm*> odometry_;  // of every node j; nullptr: none
+  std::vector<bool> lost_;                         // of every node
+  std::vector<bool> checked_;                      // of every node: the step to it
+  std::vector<bool> cut_;                          // of every node: the step to it does not hold
   SharedSurfaces surfaces_;
   std::map<Decision, bool> believed_;  // in the round before
   std::vector<bool> believed_priors_;
