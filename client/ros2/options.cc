@@ -47,14 +47,14 @@ void AddInputs(CLI::App& app, Options& options) {
       &app,
       "--mount",
       [&options](const Pose& pose, std::size_t) { options.mount = pose; },
-      "Where the sensor is on what the poses are those of [m, rad]; without it as /tf and "
+      "Where the sensor is on what the poses are those of [m, degrees]; without it as /tf and "
       "/tf_static say")
       ->group(kGroup);
   cli::AddPose(
       &app,
       "--start",
       [&options](const Pose& pose, std::size_t) { options.start = pose; },
-      "Where the odometry begins in the map [m, rad]; without it at the map's origin")
+      "Where the odometry begins in the map [m, degrees]; without it at the map's origin")
       ->group(kGroup);
   app.add_flag("--localize",
                options.localize,

@@ -36,13 +36,15 @@ absl::Status ValidateGeodeticOrigin(const GeodeticOrigin& origin) {
       std::abs(origin.longitude_rad) <= std::numbers::pi && std::abs(origin.altitude_m) <= 1e5) {
     return absl::OkStatus();
   }
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
   return absl::InvalidArgumentError(absl::StrCat("origin: latitude ",
-                                                 origin.latitude_rad,
-                                                 " rad, longitude ",
-                                                 origin.longitude_rad,
-                                                 " rad, altitude ",
+                                                 origin.latitude_rad * kDegrees,
+                                                 "°, longitude ",
+                                                 origin.longitude_rad * kDegrees,
+                                                 "°, altitude ",
                                                  origin.altitude_m,
-                                                 " m is not on earth"));
+                                                 " m is not on earth; latitudes are in [-90°, "
+                                                 "90°], longitudes in [-180°, 180°]"));
 }
 
 }  // namespace strata

@@ -128,7 +128,7 @@ class Maps:
             ways += ["--path", self.folder / f"{name}.ply"]
             self.strata("plan", "yard", "--from", start, "--to", goal, "--out", ways[-1])
         self.strata("map", "render", "yard", HERE / "quickstart.png", "--view", "oblique", "--size", "460x300", *ways)
-        self.strata("profile", "set", "yard", "wheelchair", "--radius", 0.35, "--max-step", 0.03, "--max-slope", 0.1, "--height", 1.5)
+        self.strata("profile", "set", "yard", "wheelchair", "--radius", 0.35, "--max-step", 0.03, "--max-slope", "0.1rad", "--height", 1.5)
         for profile in ("default", "wheelchair"):
             self.strata("map", "render", "yard", HERE / f"floor-{profile}.png", "--profile", profile, "--at", "0,0,3.4", "--size", "560x300")
 

@@ -111,7 +111,7 @@ void AddMapGeoreference(Commands& commands, CLI::App* noun) {
       app,
       "--sensor",
       [options](const Pose& pose, std::size_t) { options->T_body_scan = pose; },
-      "Where the sensor sits on the robot, as in scan import [m, rad]");
+      "Where the sensor sits on the robot, as in scan import [m, degrees]");
 }
 
 }  // namespace strata::cli

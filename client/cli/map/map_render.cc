@@ -199,12 +199,13 @@ void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& opti
       ->check(CLI::IsMember({"top", "oblique"}))
       ->capture_default_str();
   TakesAngle(render->add_option(
-                 "--azimuth", options->azimuth_rad, "Where an oblique view looks from [rad]"))
-      ->capture_default_str();
-  TakesAngle(
-      render->add_option("--elevation", options->elevation_rad, "Its angle above the ground [rad]"))
-      ->check(CLI::Range(0.05, 1.57))
-      ->capture_default_str();
+                 "--azimuth", options->azimuth_rad, "Where an oblique view looks from [degrees]"))
+      ->default_str("-57");
+  TakesAngle(render->add_option("--elevation",
+                                options->elevation_rad,
+                                "Its angle above the ground [degrees], 3 to 90"))
+      ->check(CLI::Range(0.05, 1.5708))
+      ->default_str("34");
   render
       ->add_option_function<std::string>(
           "--size",

@@ -76,7 +76,8 @@ void AddShapeOptions(CLI::App* verb, ShapeOptions& options) {
       verb,
       "--shape-pose",
       [&options](const Pose& T, std::size_t /*numbers*/) { options.T_robot_shape = T; },
-      "Where the shape is on the robot: its origin's place over the ground [m], and turn [rad]");
+      "Where the shape is on the robot: its origin's place over the ground [m], and turn "
+      "[degrees]");
   verb->add_option(
           "--joint", options.joints, "Position of a joint of the .urdf [rad, m]; 0 without")
       ->type_name("NAME=POSITION")

@@ -188,7 +188,7 @@ void AddPoseCommands(Commands& commands) {
       set,
       "--pose",
       [options](const Pose& pose, std::size_t) { options->T_map_scan = pose; },
-      "Where the scan's frame is in the map [m, rad]; X,Y,Z keeps the axes of the map")
+      "Where the scan's frame is in the map [m, degrees]; X,Y,Z keeps the axes of the map")
       ->required();
   CLI::App* lookup =
       commands.Verb(noun,

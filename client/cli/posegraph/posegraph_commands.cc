@@ -162,13 +162,14 @@ void AddAddConstraint(Commands& commands,
         options->constraint.T_i_j = pose;
         options->position_only = numbers == 3;
       },
-      "Pose of TO's frame in FROM's [m, rad]; X,Y,Z alone says nothing about the rotation")
+      "Pose of TO's frame in FROM's [m, degrees]; X,Y,Z alone says nothing about the rotation")
       ->required();
   app->add_option("--sigma-m", options->sigma_m, "Standard deviation of the place [m]")
       ->check(CLI::Range(1e-6, 1e6))
       ->capture_default_str();
   TakesAngle(app->add_option(
-                 "--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]"))
+                 "--sigma-rad", options->sigma_rad, "Standard deviation of the rotation [rad]"),
+             AngleUnit::kRadians)
       ->check(CLI::Range(1e-6, 10.0))
       ->capture_default_str();
   app->add_flag("--may-be-false",

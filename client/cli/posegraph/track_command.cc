@@ -146,7 +146,7 @@ void AddPosegraphTrack(Commands& commands, CLI::App* noun) {
       app,
       "--guess",
       [options](const Pose& pose, std::size_t) { options->start.T_map_scan_guess = pose; },
-      "Roughly where the first scan was taken in the map [m, rad]; without it, anywhere");
+      "Roughly where the first scan was taken in the map [m, degrees]; without it, anywhere");
   app->add_option("--radius", options->start.guess_radius_m, "Only places so near to the guess [m]")
       ->capture_default_str();
   app->add_option(

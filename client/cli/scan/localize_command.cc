@@ -96,7 +96,7 @@ void AddLocalizeCommand(Commands& commands) {
       app,
       "--guess",
       [options](const Pose& pose, std::size_t) { options->T_map_file_guess = pose; },
-      "Roughly where its frame is in the map [m, rad]; without it, anywhere");
+      "Roughly where its frame is in the map [m, degrees]; without it, anywhere");
   app->add_option("--radius", options->radius_m, "Only places so near to the guess [m]")
       ->capture_default_str();
 }

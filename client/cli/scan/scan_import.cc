@@ -111,7 +111,7 @@ void AddRecordingOptions(CLI::App* import, const std::shared_ptr<ImportOptions>&
       "--mount",
       [options](const Pose& pose, std::size_t) { options->mount = pose; },
       "Of a recording without the transforms: where the sensor is on what the poses are those of "
-      "[m, rad]");
+      "[m, degrees]");
 }
 
 }  // namespace
@@ -171,7 +171,7 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
       import,
       "--sensor",
       [options](const Pose& pose, std::size_t) { options->T_body_scan = pose; },
-      "Where the sensor sits on the robot, for poses of a trajectory [m, rad]");
+      "Where the sensor sits on the robot, for poses of a trajectory [m, degrees]");
   import
       ->add_option(
           "--pose-format",

@@ -206,7 +206,7 @@ void AddScanRegister(Commands& commands, CLI::App* noun) {
       app,
       "--guess",
       [options](const Pose& pose, std::size_t) { options->T_target_source_guess = pose; },
-      "Roughly where the source is in the target's frame [m, rad]; without it, where it says");
+      "Roughly where the source is in the target's frame [m, degrees]; without it, where it says");
   app->add_option("--max-distance",
                   options->max_distance_m,
                   "Farther pairs are none; beyond the guess's "

@@ -13,21 +13,25 @@
 
 namespace strata::cli {
 
-std::optional<double> ParseAngle(absl::string_view text) {
+std::optional<double> ParseAngle(absl::string_view text, AngleUnit unit) {
   text = absl::StripAsciiWhitespace(text);
-  const bool degrees = absl::ConsumeSuffix(&text, "deg") || absl::ConsumeSuffix(&text, "°");
-  if (!degrees) absl::ConsumeSuffix(&text, "rad");
+  if (absl::ConsumeSuffix(&text, "deg") || absl::ConsumeSuffix(&text, "°")) {
+    unit = AngleUnit::kDegrees;
+  } else if (absl::ConsumeSuffix(&text, "rad")) {
+    unit = AngleUnit::kRadians;
+  }
   double number = 0.0;
   if (!absl::SimpleAtod(absl::StripAsciiWhitespace(text), &number) || !std::isfinite(number)) {
     return std::nullopt;
   }
-  return degrees ? number * std::numbers::pi / 180.0 : number;
+  return unit == AngleUnit::kDegrees ? number * std::numbers::pi / 180.0 : number;
 }
 
-CLI::Option* TakesAngle(CLI::Option* option) {
-  const auto to_radians = [](std::string& text) {
-    const std::optional<double> angle = ParseAngle(text);
-    if (!angle.has_value()) return absl::StrCat("expected an angle as 0.35 or 20deg, got ", text);
+CLI::Option* TakesAngle(CLI::Option* option, AngleUnit unit) {
+  const auto to_radians = [unit](std::string& text) {
+    const std::optional<double> angle = ParseAngle(text, unit);
+    if (!angle.has_value())
+      return absl::StrCat("expected an angle as 20deg or 0.35rad, got ", text);
     text = absl::StrFormat("%.17g", *angle);
     return std::string();
   };

@@ -9,11 +9,14 @@
 
 namespace strata::cli {
 
-// 0.35, 0.35rad, 20deg or 20° [rad]; nullopt for anything else and what is not finite.
-std::optional<double> ParseAngle(absl::string_view text);
+enum class AngleUnit { kDegrees, kRadians };
+
+// 20deg, 20°, 0.35rad, or a number of `unit` [rad]; nullopt for anything else and what is not
+// finite.
+std::optional<double> ParseAngle(absl::string_view text, AngleUnit unit = AngleUnit::kDegrees);
 
 // Lets an option that holds a number of radians take any of these. Returns it.
-CLI::Option* TakesAngle(CLI::Option* option);
+CLI::Option* TakesAngle(CLI::Option* option, AngleUnit unit = AngleUnit::kDegrees);
 
 }  // namespace strata::cli
 

@@ -29,10 +29,11 @@ std::optional<std::vector<double>> ParseNumbers(const std::string& text,
                                                 std::size_t min_count,
                                                 std::size_t max_count,
                                                 std::size_t angle) {
+  const std::vector<absl::string_view> parts = absl::StrSplit(text, ',');
   std::vector<double> numbers;
-  for (const absl::string_view part : absl::StrSplit(text, ',')) {
+  for (const absl::string_view part : parts) {
     double number = 0.0;
-    if (numbers.size() == angle) {
+    if (numbers.size() == angle && parts.size() == angle + 1) {
       const std::optional<double> turn = ParseAngle(part);
       if (!turn.has_value()) return std::nullopt;
       number = *turn;
@@ -153,7 +154,8 @@ void AddProfileOptions(CLI::App* app, ProfileOverrides& overrides) {
   app->add_option("--radius", overrides.radius_m, "Radius of the robot's footprint [m]");
   app->add_option("--height", overrides.height_m, "Height the robot needs above a surface [m]");
   app->add_option("--max-step", overrides.max_step_m, "Highest step between cells [m]");
-  TakesAngle(app->add_option("--max-slope", overrides.max_slope_rad, "Steepest ground [rad]"));
+  TakesAngle(app->add_option(
+      "--max-slope", overrides.max_slope_rad, "Steepest ground, in degrees or as 0.35rad"));
   app->add_option("--max-gap", overrides.max_gap_m, "Longest unobserved stretch to bridge [m]");
   app->add_option(
       "--max-roughness", overrides.max_roughness_m, "Largest sigma around the local plane [m]");

@@ -25,7 +25,7 @@ namespace strata::cli {
 inline constexpr std::size_t kNoAngle = static_cast<std::size_t>(-1);
 
 // Numbers separated by commas, `min_count` to `max_count` of them, all finite; nullopt for anything
-// else. The one at the index `angle` may also be given in degrees, as in 90deg.
+// else. The one at the index `angle`, if it is the last, is in degrees or as in 1.57rad [rad].
 std::optional<std::vector<double>> ParseNumbers(const std::string& text,
                                                 std::size_t min_count,
                                                 std::size_t max_count,
@@ -41,7 +41,7 @@ CLI::Option* AddNumbers(CLI::App* app,
                         const std::string& description,
                         std::size_t angle = kNoAngle);
 
-// Adds an option that takes a pose as a place, a place and a turn about z (1.57 or 90deg), or a
+// Adds an option that takes a pose as a place, a place and a turn about z (90 or 1.57rad), or a
 // place and a quaternion, which is normalised. `set` also gets how many numbers there were: 3, 4
 // or 7.
 CLI::Option* AddPose(CLI::App* app,

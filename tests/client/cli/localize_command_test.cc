@@ -36,7 +36,7 @@ TEST_F(LocalizeCommandTest, AScanIsSearchedForInTheFramesOfItsFile) {
         return absl::StatusOr<LocalizeResult>(result);
       });
   const std::vector<std::string> words = {
-      "localize", "m", file, "--guess", "1,2,3,0.5", "--radius", "7"};
+      "localize", "m", file, "--guess", "1,2,3,0.5rad", "--radius", "7"};
   const Json result = RunJson(words);
   EXPECT_EQ(seen.cloud.size(), 3U);
   EXPECT_TRUE(seen.cloud.origin.isZero());

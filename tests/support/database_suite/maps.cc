@@ -48,7 +48,8 @@ TEST_P(DatabaseSuite, AnOriginIsSetAndSetAgain) {
     EXPECT_EQ(after.parameters, before.parameters);
   }
   EXPECT_THAT(db().maps().SetOrigin({}, kMap, {2.0, 0.0, 0.0}),
-              StatusIs(Code::kInvalidArgument, HasSubstr("not on earth")));
+              StatusIs(Code::kInvalidArgument,
+                       HasSubstr("latitude 114.592°, longitude 0°, altitude 0 m is not on earth")));
   STRATA_ASSERT_OK_AND_ASSIGN(const MapInfo kept, db().maps().Get({}, kMap));
   EXPECT_EQ(kept.parameters.origin, (GeodeticOrigin{-0.5, 3.0, -2.0}));
 }

@@ -44,7 +44,7 @@ TEST_F(PosegraphCommandsTest, AConstraintIsSaidInMetresAndRadians) {
            "a/1",
            "b/2",
            "--pose",
-           "1,2,3,1.5707963267948966",
+           "1,2,3,90",
            "--sigma-m",
            "0.1",
            "--sigma-rad",

@@ -73,7 +73,7 @@ TEST_F(TrackCommandTest, FollowsTheScansOfAFolder) {
                         "m",
                         dir_.path().string(),
                         "--guess",
-                        "1,2,3,0.5",
+                        "1,2,3,0.5rad",
                         "--radius",
                         "7",
                         "--out",
