@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -19,6 +20,8 @@
 
 namespace strata {
 namespace {
+
+constexpr int kMostMissingRows = 10'000;  // one after the other
 
 using BagQuery = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 
@@ -71,7 +74,12 @@ absl::Status SqliteBagReader::CheckTables() {
                                  "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name "
                                  "IN ('topics', 'messages') AND sql LIKE 'CREATE TABLE%'");
   if (query == nullptr || sqlite3_step(query.get()) != SQLITE_ROW) {
-    return absl::InvalidArgumentError(absl::StrCat(name_, ": ", Fault()));
+    const bool is_corrupt = sqlite3_errcode(database_.get()) == SQLITE_CORRUPT;
+    return absl::InvalidArgumentError(absl::StrCat(
+        name_,
+        ": ",
+        Fault(),
+        is_corrupt ? "; sqlite3 FILE .recover | sqlite3 NEW.db3 may save some of it" : ""));
   }
   if (sqlite3_column_int(query.get(), 0) == 2) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -107,11 +115,29 @@ absl::Status SqliteBagReader::Visit(Visitor visit) {
   if (last != nullptr && sqlite3_step(last.get()) == SQLITE_ROW) {
     last_row_ = sqlite3_column_int64(last.get(), 0);
   }
-  const BagQuery query = Prepare(
-      database_.get(), "SELECT rowid, topic_id, timestamp, data FROM messages ORDER BY rowid");
+  // Damage hides rows, nobody knows how many: what comes behind them is looked for row by row.
+  std::int64_t after = std::numeric_limits<std::int64_t>::min();
+  for (int missing = 0; missing <= kMostMissingRows;) {
+    STRATA_ASSIGN_OR_RETURN(const bool is_end, VisitAfter(after, visit));
+    if (is_end) return absl::OkStatus();
+    if (missing == 0 || row_ > after)
+      AddDamage(absl::StrCat("after message ", row_, ": ", Fault()));
+    missing = row_ > after ? 1 : missing + 1;
+    after = std::max(row_, after);
+    if (after == std::numeric_limits<std::int64_t>::max()) break;
+    ++after;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> SqliteBagReader::VisitAfter(std::int64_t after, Visitor visit) {
+  const BagQuery query = Prepare(database_.get(),
+                                 "SELECT rowid, topic_id, timestamp, data FROM messages WHERE "
+                                 "rowid > ? ORDER BY rowid");
   if (query == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat(name_, ": table messages: ", Fault()));
   }
+  sqlite3_bind_int64(query.get(), 1, after);
   int result = SQLITE_ROW;
   while ((result = sqlite3_step(query.get())) == SQLITE_ROW) {
     row_ = sqlite3_column_int64(query.get(), 0);
@@ -125,10 +151,7 @@ absl::Status SqliteBagReader::Visit(Visitor visit) {
                                   .bytes = SqlBlobOf(query.get(), 3),
                                   .place = {.chunk = 0, .at = static_cast<std::uint64_t>(row_)}}));
   }
-  if (result != SQLITE_DONE) {
-    AddDamage(absl::StrCat("ends after message ", row_, ": ", Fault()));
-  }
-  return absl::OkStatus();
+  return result == SQLITE_DONE;
 }
 
 absl::StatusOr<std::string> SqliteBagReader::Read(const MessagePlace& place) {

@@ -39,6 +39,8 @@ class SqliteBagReader final : public BagReader {
   // INVALID_ARGUMENT if the file has not the tables of a bag.
   absl::Status CheckTables();
   absl::Status ReadTopics();
+  // Rows behind `after`, up to damage or the end: true at the end.
+  absl::StatusOr<bool> VisitAfter(std::int64_t after, Visitor visit);
   std::string Fault() const;  // what SQLite says
 
   Database database_;

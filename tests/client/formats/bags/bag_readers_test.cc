@@ -1,4 +1,5 @@
 // The containers: MCAP, rosbag2's SQLite and ROS 1's bag give the same messages, whole or damaged.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -168,6 +169,24 @@ TEST_F(BagReadersTest, CutFilesGiveWhatComesBefore) {
   EXPECT_GT(cut.entries.size(), 50U);  // also those of the chunk that it ends in
   EXPECT_THAT(cut.damage, Contains(HasSubstr("ends at byte 100000")));
   EXPECT_THAT(cut.damage, Contains(HasSubstr("cut short; its first messages are read")));
+}
+
+TEST_F(BagReadersTest, OfADamagedSqliteFileAllOtherMessagesAreRead) {
+  const std::vector<BagEntry> entries = DrawEntries(11, "std_msgs/msg/String");
+  ASSERT_TRUE(testing::WriteDb3(dir_.path() / "a.db3", entries));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string file, ReadFileBytes(dir_.path() / "a.db3"));
+  std::string holed = file;
+  constexpr std::size_t kPage = 4096;
+  std::fill_n(
+      holed.begin() + static_cast<std::ptrdiff_t>(file.size() / 2 / kPage * kPage), kPage, '\x5a');
+  STRATA_ASSERT_OK_AND_ASSIGN(const Visited around, ReadAll(Write("holed.db3", holed)));
+  EXPECT_GT(around.entries.size(), 180U);
+  EXPECT_LT(around.entries.size(), 200U);
+  EXPECT_EQ(around.entries.back().bytes, entries.back().bytes);
+  EXPECT_THAT(around.damage, Contains(HasSubstr("after message ")));
+  // What lies beyond the end reads as zeros there, so that nobody knows which messages are whole.
+  EXPECT_THAT(ReadAll(Write("cut.db3", file.substr(0, file.size() / 2))),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("sqlite3 FILE .recover")));
 }
 
 TEST_F(BagReadersTest, AChunkWithAnotherChecksumIsLeftOutAndTheOthersAreRead) {
