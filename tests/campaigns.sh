@@ -39,6 +39,7 @@ tracking|~6|a robot that is not where it is said to be, or not found again|$expe
 two_sides|~40|a thin deck or wall that is drawn together, or pulls scans to its other side|/usr/bin/python3 tests/experiments/two_sides.py --build $build --seed $seed
 localisation|~20|a scan from elsewhere that is given a place in a map|/usr/bin/python3 tests/experiments/localisation.py --build $build --seed $seed
 ros2|14|a keyframe of a robot of ROS 2 that is lost or otherwise in the map than its recording, memory of strata-ros2|$experiments/ros2_campaign
+egomotion|~5|a filter of IMU, wheels and GPS that is off by more than its bounds|tests/experiments/results.py --build $build husky dresden simulated_car
 car_maps|~12|a car's way of 2.3 km that is off by more than closures should leave, or a map larger than the thesis'|/usr/bin/python3 tests/experiments/car_maps.py --build $build --seed $seed
 paced|8|a scan that is not in the map within 2 s while loops are closed|/usr/bin/python3 tests/experiments/paced.py --build $build
 recordings|4|recorded drives that end off|/usr/bin/python3 tests/experiments/real_data.py --build $build

@@ -30,17 +30,7 @@ struct MotionOptions {
 
 // What a user would ask next.
 void TalkOf(const Egomotion& egomotion, const MotionOptions& options, Output& output) {
-  const EgomotionReport& report = egomotion.report;
-  if (!report.recoveries.empty()) {
-    output.Talk(absl::StrCat("warning: the state was wrong and moved to where fixes agree, ",
-                             report.recoveries.size(),
-                             " time(s); poses before each are off by as much as 'moved_m' says"));
-  }
-  if (2 * report.rejected > report.fixes) {
-    output.Talk(
-        "warning: more than half of the fixes were rejected; a wrong rig (--rig: antenna, "
-        "lag, IMU's orientation) or σ that are too small look like that");
-  }
+  WarnOf(egomotion.report, output);
   output.Talk(absl::StrCat("next: strata scan import MAP SCANS --poses ", options.out));
 }
 

@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "absl/strings/str_cat.h"
 #include <Eigen/Core>
 
 #include "client/cli/terminal/json.h"
@@ -36,6 +37,19 @@ Json GapsOf(const EgomotionReport& report) {
 }
 
 }  // namespace
+
+void WarnOf(const EgomotionReport& report, Output& output) {
+  if (!report.recoveries.empty()) {
+    output.Talk(absl::StrCat("warning: the state was wrong and moved to where fixes agree, ",
+                             report.recoveries.size(),
+                             " time(s); poses before each are off by as much as 'moved_m' says"));
+  }
+  if (2 * report.rejected > report.fixes) {
+    output.Talk(
+        "warning: more than half of the fixes were rejected; a wrong rig (--rig: antenna, "
+        "lag, IMU's orientation) or σ that are too small look like that");
+  }
+}
 
 Json ToJson(const Egomotion& egomotion) {
   const EgomotionReport& report = egomotion.report;

@@ -189,6 +189,10 @@ absl::Status Run(Context& context, DriveOptions options) {
   report.erase("seconds");
   Print(options.import, summary, context.output, report);
   STRATA_RETURN_IF_ERROR(waited);
+  WarnOf(run->report, context.output);
+  context.output.Talk(absl::StrCat("next: strata job start ",
+                                   options.import.map,
+                                   " optimize --wait, which holds the poses to the fixes"));
   return ErrorsOf(summary.errors, summary.files);
 }
 
@@ -202,7 +206,7 @@ void AddImportOptions(CLI::App* app, const std::shared_ptr<DriveOptions>& option
       app,
       "--sensor",
       [options](const Pose& pose, std::size_t) { options->import.T_body_scan = pose; },
-      "Where the sensor sits on the robot [m, rad]");
+      "Where the sensor sits on the robot [m, degrees]");
   app->add_option("--every",
                   options->import.every,
                   absl::StrCat("Keep a scan when it lies so far from the one kept last, turned or "

@@ -83,9 +83,12 @@ absl::StatusOr<std::vector<std::vector<double>>> ParseColumns(
                           PlacesOf(CellsOf(header.value_or("")), columns));
   std::vector<std::vector<double>> rows;
   while (const std::optional<absl::string_view> line = NextRow(cursor)) {
-    STRATA_ASSIGN_OR_RETURN(std::vector<double> numbers,
-                            RowNumbers(cursor, *line, places, columns));
-    rows.push_back(std::move(numbers));
+    absl::StatusOr<std::vector<double>> numbers = RowNumbers(cursor, *line, places, columns);
+    // A robot that lost its power was writing its last line.
+    const bool is_cut = line->data() + line->size() == text.data() + text.size();
+    if (!numbers.ok() && is_cut && !rows.empty()) break;
+    STRATA_RETURN_IF_ERROR(numbers.status());
+    rows.push_back(*std::move(numbers));
   }
   return rows;
 }

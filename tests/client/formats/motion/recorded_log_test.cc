@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "absl/strings/str_cat.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -75,6 +76,21 @@ TEST_F(RecordedLogTest, ErrorsNameFileLineAndCure) {
   Write("imu.csv", "stamp,wx,wy,wz,ax,ay,az\n1,0,0,0,0,0,9.8\n");
   EXPECT_THAT(ReadRecordedLog(dir_.path()),
               StatusIs(kInvalid, AllOf(HasSubstr("gps.csv"), HasSubstr("no column 'var_u'"))));
+}
+
+// As when a robot lost its power while it wrote.
+TEST_F(RecordedLogTest, ALastLineThatIsCutIsLeftOut) {
+  const std::string header = "stamp,wx,wy,wz,ax,ay,az\n";
+  Write("gps.csv", "stamp,lat,lon,alt,var_e,var_n,var_u\n1,60,9,2,1,4,9\n2,60,9");
+  for (const char* cut : {"", "2", "2,0,0,0", "2,0,0,0,0,0,", "2,0,0,0,0,0,-"}) {
+    Write("imu.csv", absl::StrCat(header, "1,0,0,0,0,0,9.8\n", cut));
+    STRATA_ASSERT_OK_AND_ASSIGN(const RecordedLog read, ReadRecordedLog(dir_.path()));
+    EXPECT_EQ(read.log.imu.size(), 1U) << cut;
+    EXPECT_EQ(read.log.fixes.size(), 1U);
+  }
+  Write("imu.csv", absl::StrCat(header, "2,0,0"));
+  EXPECT_THAT(ReadRecordedLog(dir_.path()),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("line 2")));
 }
 
 TEST_F(RecordedLogTest, Husky) {
