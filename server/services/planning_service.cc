@@ -22,11 +22,20 @@ namespace {
 using translate::FromProto;
 using translate::ToProto;
 
+// A place that nobody gave is not the map's origin.
+absl::Status CheckGiven(bool given, absl::string_view field) {
+  if (given) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, " is missing; give it as {\"x_m\": 1.5, \"y_m\": 2}"));
+}
+
 absl::Status PlanPath(api::Database& db,
                       const api::Call& call,
                       const v1::PlanPathRequest& in,
                       v1::PlanPathResponse& out) {
   STRATA_ASSIGN_OR_RETURN(const PlanQuery query, AtTheDoor(FromProto(in)));
+  STRATA_RETURN_IF_ERROR(AtTheDoor(CheckGiven(in.has_from(), "from")));
+  STRATA_RETURN_IF_ERROR(AtTheDoor(CheckGiven(in.has_to(), "to")));
   STRATA_ASSIGN_OR_RETURN(const PlanResult result, db.planning().PlanPath(call, in.map(), query));
   out = ToProto(result);
   return absl::OkStatus();

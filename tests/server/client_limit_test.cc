@@ -107,6 +107,8 @@ TEST_F(ClientLimitTest, OneClientsSearchesHoldUpNobodyElse) {
     searches.emplace_back([this, &context] {
       v1::PlanPathRequest in;
       in.set_map("world");
+      in.mutable_from();
+      in.mutable_to();
       v1::PlanPathResponse out;
       EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, in, &out, &context),
                   StatusIs(Code::kCancelled, _));

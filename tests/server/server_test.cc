@@ -34,8 +34,11 @@ using Code = absl::StatusCode;
 class ServerTest : public ServedMock {
  protected:
   absl::Status PlanPath(grpc::ClientContext* context = nullptr) {
+    v1::PlanPathRequest in;
+    in.mutable_from();
+    in.mutable_to();
     v1::PlanPathResponse out;
-    return Call<v1::Planning>(&v1::Planning::Stub::PlanPath, v1::PlanPathRequest(), &out, context);
+    return Call<v1::Planning>(&v1::Planning::Stub::PlanPath, in, &out, context);
   }
   absl::Status ListMaps(grpc::ClientContext* context = nullptr) {
     v1::ListMapsResponse out;
@@ -155,6 +158,12 @@ TEST_F(ServerTest, WhatIsWrongInItselfNeverReachesTheDatabase) {
   plan.mutable_profile()->set_radius_m(1e9);
   EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, plan, &planned),
               StatusIs(Code::kInvalidArgument, HasSubstr("radius_m")));
+  plan.clear_profile();
+  EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, plan, &planned),
+              StatusIs(Code::kInvalidArgument, HasSubstr("from is missing")));
+  plan.mutable_from();
+  EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, plan, &planned),
+              StatusIs(Code::kInvalidArgument, HasSubstr("to is missing")));
 
   v1::GetTileRequest tile;
   v1::GetTileResponse got;

@@ -20,8 +20,11 @@ using ::testing::_;
 class ShutdownTest : public ServedMock {
  protected:
   absl::Status PlanPath() {
+    v1::PlanPathRequest in;
+    in.mutable_from();
+    in.mutable_to();
     v1::PlanPathResponse out;
-    return Call<v1::Planning>(&v1::Planning::Stub::PlanPath, v1::PlanPathRequest(), &out);
+    return Call<v1::Planning>(&v1::Planning::Stub::PlanPath, in, &out);
   }
   absl::Notification started_;
 };
