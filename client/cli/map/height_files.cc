@@ -98,8 +98,7 @@ absl::StatusOr<Heights> HeightsOf(Context& context,
 absl::Status NoHeights(Context& context, const std::string& map) {
   STRATA_ASSIGN_OR_RETURN(const MapStats stats, context.database.maps().Stats(context.call, map));
   if (stats.patches == 0) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "map ", map, " has no surfaces: import scans, or wait until they are integrated"));
+    return NoSurfaces(map);
   }
   return absl::NotFoundError(absl::StrCat(
       "no surface of map ", map, " lies in the region; the map lies ", ExtentOf(stats)));

@@ -156,6 +156,10 @@ absl::StatusOr<Geometry> MeshOf(Context& context,
   damage = fetched.damage;
   const bool own_colours = options.layer == "colour";
   if (own_colours) STRATA_RETURN_IF_ERROR(ExpectColours(options.map, fetched.tiles));
+  if (fetched.tiles.empty()) {
+    STRATA_RETURN_IF_ERROR(damage);
+    return NoSurfaces(options.map);
+  }
   const double cell_size_m = info.parameters.mls.cell_size_m;
   Geometry geometry = GeometryOf(fetched.tiles, cell_size_m, options.level, own_colours);
   if (options.format == "mcap") {
@@ -207,6 +211,13 @@ absl::StatusOr<Geometry> PointsOf(Context& context, const ExportOptions& options
           }
           return absl::OkStatus();
         }));
+  }
+  if (geometry.vertices.empty()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("map ",
+                     options.map,
+                     " has no points: import scans, or wait until they are integrated; a map with "
+                     "keep_points off has dropped them, and ply has its surfaces"));
   }
   DropIfNone(geometry.label);
   if (!coloured) geometry.colour.clear();

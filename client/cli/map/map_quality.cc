@@ -44,7 +44,8 @@ absl::StatusOr<MapQuality> QualityOf(api::Database& database,
   if (!absl::IsDataLoss(listed)) STRATA_RETURN_IF_ERROR(listed);
   STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> jobs, database.jobs().List(call, map));
   for (const JobInfo& job : jobs) {
-    if (job.kind == kOptimizeJob && job.state == JobState::kSucceeded) {
+    const bool sets_poses = job.kind == kOptimizeJob || job.kind == kRevertJob;
+    if (sets_poses && job.state == JobState::kSucceeded) {
       quality.optimized = absl::StrCat("job ", job.id, ": ", job.message);
     }
   }

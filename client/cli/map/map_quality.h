@@ -16,7 +16,7 @@ namespace strata::cli {
 struct MapQuality {
   AlignmentHealth alignment;            // of the scans that lie where their alignment put them
   std::size_t scans_moved_by_jobs = 0;  // the others
-  std::string optimized;                // what the last optimize job said that succeeded
+  std::string optimized;                // what the last optimize or revert said that succeeded
   // Relative poses that optimize found or a person gave,
   std::size_t loops_closed = 0;        // that the poses agree with,
   std::size_t loops_open = 0;          // that they are off from by more than 0.5 m or 3°,

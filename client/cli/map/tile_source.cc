@@ -53,6 +53,11 @@ absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
   return fetched;
 }
 
+absl::Status NoSurfaces(const std::string& map) {
+  return absl::FailedPreconditionError(absl::StrCat(
+      "map ", map, " has no surfaces: import scans, or wait until they are integrated"));
+}
+
 absl::Status ExpectColours(const std::string& map, const std::vector<SurfaceTile>& tiles) {
   bool empty = true;
   for (const SurfaceTile& tile : tiles) {

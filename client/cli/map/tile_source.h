@@ -25,6 +25,9 @@ absl::StatusOr<FetchedTiles> FetchTiles(Context& context,
                                         const std::string& map,
                                         const api::TileArea& area);
 
+// FAILED_PRECONDITION: what to do about a map without any.
+absl::Status NoSurfaces(const std::string& map);
+
 // FAILED_PRECONDITION where there are surfaces and none of them has a colour.
 absl::Status ExpectColours(const std::string& map, const std::vector<SurfaceTile>& tiles);
 

@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t kFewestRows = 10;     // of a table on a low terminal
 constexpr std::size_t kNarrowestCell = 20;  // of one whose text goes on in further lines
+constexpr std::size_t kIndent = 4;          // of one that has lines of its own
 
 std::string Padded(const std::string& text, std::size_t width, bool right) {
   const std::string blank(width - std::min(width, ShownWidth(text)), ' ');
@@ -44,6 +45,12 @@ Hue HueOf(const std::string& key, const std::string& text) {
   if (in(kGood, text)) return Hue::kGood;
   if (in(kBad, text)) return Hue::kBad;
   return in(kDoubtful, text) ? Hue::kDoubtful : Hue::kPlain;
+}
+
+// Lines of no more than `columns`, all but the first behind `indent` blanks.
+std::string Block(const std::string& text, std::size_t columns, std::size_t indent) {
+  return absl::StrJoin(absl::StrSplit(Filled(text, columns - indent, 0), '\n'),
+                       "\n" + std::string(indent, ' '));
 }
 
 // A table of text: cells, widths, and what stands right.
@@ -81,8 +88,10 @@ std::string LineOf(const Table& table, std::size_t r, const Screen& screen) {
       left += table.widths[c] + 2;
       cell = Padded(cell, table.widths[c], table.right[c]) + "  ";
     } else if (left + kNarrowestCell <= screen.columns) {
-      cell = Filled(Padded(cell, table.widths[c], table.right[c]), screen.columns - left, 0);
-      cell = absl::StrJoin(absl::StrSplit(cell, '\n'), "\n" + std::string(left, ' '));
+      cell = Block(Padded(cell, table.widths[c], table.right[c]), screen.columns, left);
+    } else if (r > 0 && screen.columns > kIndent && left + ShownWidth(cell) > screen.columns) {
+      line = StripEnd(line);
+      cell = "\n" + std::string(kIndent, ' ') + Block(cell, screen.columns, kIndent);
     } else {
       cell = Padded(cell, table.widths[c], table.right[c]);
     }

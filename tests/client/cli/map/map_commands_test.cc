@@ -192,6 +192,11 @@ TEST_F(MapCommandsTest, AMapSaysHowWellItsScansAndLoopsAgree) {
   EXPECT_EQ(shown["loops_closed"], 2);
   EXPECT_EQ(shown["loops_open"], 1);
   EXPECT_EQ(shown["loops_not_believed"], 1);
+  JobInfo revert = Job(10, JobState::kSucceeded);
+  revert.kind = "revert";
+  revert.message = "back to epoch 1";
+  ON_CALL(db_.jobs(), List(_, _)).WillByDefault(Return(std::vector<JobInfo>{optimize, revert}));
+  EXPECT_EQ(RunJson({"map", "show", "m"})["optimized"], "job 10: back to epoch 1");
   const std::string text = RunText({"map", "show", "m"});
   EXPECT_THAT(text, HasSubstr("median overlap 0.80, 2 of 3 aligned, 0 at the step limit"));
   EXPECT_THAT(text, HasSubstr("2 closed, 1 open, 1 not believed"));

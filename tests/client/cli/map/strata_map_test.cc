@@ -108,8 +108,21 @@ TEST_F(StrataMapTest, BackupsAndMapsAreMergedIntoOne) {
   EXPECT_THAT(Run({"map", "merge", "all", "m"}).err, HasSubstr("all exists"));
 }
 
-TEST_F(StrataMapTest, OutputThatCannotBeWrittenIsAFailure) {
+TEST_F(StrataMapTest, AMapWithoutAnythingIsNotExported) {
   RunOk({"map", "create", "m"});
+  for (const std::string format : {"ply", "glb", "mcap", "pcd", "geotiff"}) {
+    const std::string file = (dir_.path() / ("empty." + format)).string();
+    const Ran ran = Run({"map", "export", "m", "--format", format, "--out", file});
+    EXPECT_EQ(ran.exit_code, 1) << format;
+    EXPECT_THAT(ran.err, HasSubstr("import scans, or wait until they are integrated"));
+    EXPECT_FALSE(std::filesystem::exists(file)) << format;
+  }
+}
+
+TEST_F(StrataMapTest, OutputThatCannotBeWrittenIsAFailure) {
+  WriteDrive(1);
+  RunOk({"map", "create", "m"});
+  Import({"--align", "off"});
   const Ran ran = Run({"map", "export", "m", "--format", "ply", "--out", "/dev/full"});
   EXPECT_EQ(ran.exit_code, 1);
   EXPECT_EQ(ran.out, "");

@@ -121,6 +121,20 @@ TEST(OutputTest, ATerminalGetsWhatItShowsAndAPipeGetsAll) {
   EXPECT_NE(data.str().find("99  one two three four five six\n"), std::string::npos);
 }
 
+TEST(OutputTest, WhatDoesNotFitBesideTheOthersStandsBelow) {
+  const Json rows = {{{"id", "0123456789"}, {"note", "one two three four five six"}},
+                     {{"id", "1"}, {"note", "short"}}};
+  std::ostringstream data;
+  Output(OutputFormat::kText, data, data, {.columns = 24, .rows = 24, .colour = false})
+      .List(rows, {{"id", "ID"}, {"note", "NOTE"}});
+  EXPECT_EQ(data.str(),
+            "ID          NOTE\n"
+            "0123456789\n"
+            "    one two three four\n"
+            "    five six\n"
+            "1           short\n");
+}
+
 TEST(OutputTest, VerdictsWarningsAndErrorsHaveColour) {
   const Screen colour{.columns = 0, .rows = 0, .colour = true};
   std::ostringstream data;
