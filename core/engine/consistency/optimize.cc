@@ -220,13 +220,14 @@ class Optimizer {
     context_.SetMetric("shift_rms_m", rms);
     context_.SetMetric("shift_max_m", largest);
     return absl::StrFormat(
-        "%d scans, %d planes: moved by %.3f m rms, %.3f m at most; %s after %d rounds.",
+        "%d scans, %d planes: moved by %.3f m rms, %.3f m at most; %s after %d %s.",
         world.size(),
         result.planes.size(),
         rms,
         largest,
         result.termination == AlignmentTermination::kSettled ? "settled" : "not settled",
-        result.rounds.size());
+        result.rounds.size(),
+        result.rounds.size() == 1 ? "round" : "rounds");
   }
 
   // How many, and the worst by name.

@@ -1,4 +1,5 @@
-// Things are found, sorted into kinds and completed, and the server is killed under these jobs.
+// Planes and things are found, these sorted into kinds and completed, and the server is killed
+// under these jobs.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -18,6 +19,7 @@
 #include "core/cloud/cloud_slice.h"
 #include "core/common/status.h"
 #include "core/geometry/pose.h"
+#include "core/world/plane_model.h"
 #include "core/world/things/entity.h"
 #include "core/world/things/inferred.h"
 #include "tests/integration/crashes/killed_server.h"
@@ -51,8 +53,9 @@ Scene Yard() {
   return scene;
 }
 
-// What both jobs made.
+// What the jobs made.
 struct Outcome {
+  std::vector<std::tuple<PlaneKind, double, std::size_t>> planes;
   std::vector<std::tuple<std::uint64_t, std::uint16_t, std::uint64_t, std::uint64_t>> entities;
   std::vector<InferredPart> inferred;
 
@@ -75,6 +78,11 @@ class World : public KilledServer {
   }
   Outcome Result() {
     Outcome outcome;
+    const auto keep = [&outcome](const ModelPlane& plane) {
+      outcome.planes.emplace_back(plane.kind, plane.area_m2, plane.polygons.size());
+      return absl::OkStatus();
+    };
+    STRATA_EXPECT_OK(db().models().GetPlaneModel({}, kMap, keep).status());
     STRATA_EXPECT_OK(db().objects().ListEntities({}, kMap, {}, [&](const Entity& entity) {
       const std::uint64_t kind = entity.kind.has_value() ? entity.kind->id : 0;
       outcome.entities.emplace_back(entity.id, entity.class_id, entity.points, kind);
@@ -114,13 +122,14 @@ class World : public KilledServer {
 void ExpectKindsAndMore(const Outcome& outcome) {
   std::set<std::uint64_t> kinds;
   for (const auto& entity : outcome.entities) kinds.insert(std::get<3>(entity));
+  EXPECT_FALSE(outcome.planes.empty());
   EXPECT_EQ(outcome.entities.size(), 10U);
   EXPECT_EQ(kinds.size(), 2U);
   EXPECT_EQ(outcome.inferred.size(), 10U);
   EXPECT_GT(outcome.inferred_points(), 100U);
 }
 
-TEST(ObjectsCrashTest, ThingsAndWhatIsInferredOfThemAreThoseOfUndisturbedJobs) {
+TEST(ObjectsCrashTest, PlanesThingsAndWhatIsInferredOfThemAreThoseOfUndisturbedJobs) {
   const std::uint64_t kills = Asked("STRATA_KILLS", 3);
   const std::uint64_t seed = Asked("STRATA_SEED", 20261127);
   SCOPED_TRACE(absl::StrCat("seed ", seed));
@@ -131,20 +140,20 @@ TEST(ObjectsCrashTest, ThingsAndWhatIsInferredOfThemAreThoseOfUndisturbedJobs) {
     World world;
     ASSERT_NO_FATAL_FAILURE(world.Prepare());
     const absl::Time begun = absl::Now();
+    world.Run("planes");
     world.Run("objects", kFind);
     world.Run("complete");
-    undisturbed = (absl::Now() - begun) / 2;
+    undisturbed = (absl::Now() - begun) / 3;
     expected = world.Result();
   }
   ExpectKindsAndMore(expected);
 
   World world;
   ASSERT_NO_FATAL_FAILURE(world.Prepare());
-  for (const bool finds : {true, false}) {
-    const char* const kind = finds ? "objects" : "complete";
-    STRATA_ASSERT_OK_AND_ASSIGN(
-        const JobInfo job,
-        world.db().jobs().Start({}, kMap, kind, finds ? kFind : JobParameters()));
+  for (const std::string kind : {"planes", "objects", "complete"}) {
+    const JobParameters parameters = kind == "objects" ? kFind : JobParameters();
+    STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo job,
+                                world.db().jobs().Start({}, kMap, kind, parameters));
     for (std::uint64_t k = 0; k < kills; ++k) {
       const double share = std::uniform_real_distribution<double>(0.0, 1.0)(random);
       absl::SleepFor(share * undisturbed);
@@ -153,6 +162,7 @@ TEST(ObjectsCrashTest, ThingsAndWhatIsInferredOfThemAreThoseOfUndisturbedJobs) {
     world.Follow(job.id);
   }
   const Outcome outcome = world.Result();
+  EXPECT_EQ(outcome.planes, expected.planes);
   EXPECT_EQ(outcome.entities, expected.entities);
   EXPECT_EQ(outcome.inferred, expected.inferred);
 }
