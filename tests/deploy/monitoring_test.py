@@ -144,6 +144,12 @@ class ComposeTest(unittest.TestCase):
             checked = containerfile.check(command, config)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
 
+    def test_the_image_has_the_viewer(self):
+        """Its target is there where cmake found node and npm, and packages take along what was built before them."""
+        build = containerfile.CONTAINERFILE.read_text()
+        steps = [build.index(step) for step in ("nodejs npm", "cmake --preset release", "--target viewer", "cpack")]
+        self.assertEqual(steps, sorted(steps))
+
     def test_prometheus_scrapes_what_stratad_opens(self):
         compose = yaml.safe_load((COMPOSE / "compose.yml").read_text())
         config = yaml.safe_load((COMPOSE / "prometheus.yml").read_text())
