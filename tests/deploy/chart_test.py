@@ -1,8 +1,10 @@
 """The Helm chart rendered, and what comes out held to the fields that Kubernetes knows.
 
 Neither helm nor a cluster's API is in Debian 12 (kubectl --dry-run=client asks a cluster, too), so the few template actions that
-the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if, range, end.
+the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if, range, end,
+include of another file | sha256sum.
 """
+import hashlib
 import json
 import pathlib
 import re
@@ -16,6 +18,7 @@ import yaml
 import containerfile
 
 CHART = pathlib.Path(__file__).resolve().parents[2] / "deploy/helm/strata"
+INCLUDE = re.compile(r'include \(print \$\.Template\.BasePath "/([\w.]+)"\) \.')
 ACTION = re.compile(r"(\s*)\{\{(-?)\s*(.*?)\s*\}\}", re.S)
 
 
@@ -52,12 +55,16 @@ class Template:
         first, *filters = [part.strip() for part in action.split("|")]
         if first.startswith("toYaml "):
             value = yaml.safe_dump(self.value(first.split()[1], dot), default_flow_style=False).rstrip("\n")
+        elif included := INCLUDE.fullmatch(first):
+            value = Template((CHART / "templates" / included[1]).read_text(), self.scope).render()[0]
         else:
             assert re.fullmatch(r"\.[\w.]*", first), f"action {{{{ {action} }}}} is not one that this test knows"
             value = self.value(first, dot)
         for name in filters:
             if name == "quote":
                 value = json.dumps(str(value))
+            elif name == "sha256sum":
+                value = hashlib.sha256(value.encode()).hexdigest()
             elif match := re.fullmatch(r"nindent (\d+)", name):
                 value = "".join("\n" + " " * int(match[1]) + line for line in str(value).split("\n"))
             else:
@@ -128,7 +135,7 @@ POD = {
                                        "capabilities": {"drop": None}},
                    "volumeMounts": {"name": None, "mountPath": None, "subPath": None}},
     "volumes": {"name": None, "emptyDir": None, "configMap": {"name": None}, "persistentVolumeClaim": {"claimName": None},
-                "secret": {"secretName": None, "defaultMode": None}},
+                "secret": {"secretName": None, "defaultMode": None, "items": {"key": None, "path": None}}},
 }
 SPECS = {
     ("v1", "ConfigMap"): {"data": None},
@@ -206,6 +213,30 @@ class ChartTest(unittest.TestCase):
                 container, = made["StatefulSet"]["spec"]["template"]["spec"]["containers"]
                 checked = containerfile.check(container.get("args", []), config)
                 self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_a_changed_configuration_restarts_the_pod(self):
+        def pod(**changes):
+            return rendered(**changes)["StatefulSet"]["spec"]["template"]
+        self.assertNotEqual(pod(), pod(config="cache = 320\n"))
+        self.assertEqual(pod(), pod(backup={"keep": 3}))
+
+    def test_the_backup_has_the_authority_of_a_certificate(self):
+        """A Secret of type kubernetes.io/tls has tls.crt and tls.key, and ca.crt only by who adds it."""
+        for backup, secret in (({}, "tls"), ({"caSecret": "authority"}, "authority")):
+            made = rendered(tlsSecret="tls", backup={"enabled": True, **backup})
+            job = made["CronJob"]["spec"]["jobTemplate"]["spec"]["template"]["spec"]
+            container, = job["containers"]
+            settings = {entry["name"]: entry["value"] for entry in container["env"]}
+            mount, = (mount for mount in container["volumeMounts"] if mount["name"] == "ca")
+            volume, = (volume for volume in job["volumes"] if volume["name"] == "ca")
+            item, = volume["secret"]["items"]
+            self.assertEqual(volume["secret"]["secretName"], secret)
+            self.assertEqual(settings["STRATA_BACKUP_OPTIONS"], f"--tls-ca {mount['mountPath']}/{item['path']}")
+            host = settings["STRATA_SERVER"].partition(":")[0]
+            self.assertEqual(host, made["Service"]["metadata"]["name"])
+            values = (CHART / "values.yaml").read_text()
+            for said in (f"key `{item['key']}`", "DNS:" + host.replace("maps", "RELEASE")):
+                self.assertIn(said, values)
 
     def test_with_tls_and_tokens_nothing_is_insecure(self):
         made = rendered(**EVERYTHING)
