@@ -32,7 +32,7 @@ sys.path.insert(0, str(ROOT / "tests/support"))
 from postgres_database import Database  # noqa: E402, from the folder above
 
 TOUR = ["docs/quickstart.md", "docs/concepts.md", "docs/profiles.md", "docs/howto/georeference.md", "docs/howto/floorplan.md",
-        "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
+        "docs/howto/mesh.md", "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
 DATABASE_PAGE = "docs/howto/postgresql.md"
 
 
