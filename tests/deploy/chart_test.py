@@ -1,11 +1,12 @@
 """The Helm chart rendered, and what comes out held to the fields that Kubernetes knows.
 
 Neither helm nor a cluster's API is in Debian 12 (kubectl --dry-run=client asks a cluster, too), so the few template actions that
-the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if, range, end,
-include of another file | sha256sum.
+the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if (not,
+or), range, end, include of another file | sha256sum.
 """
 import hashlib
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -16,6 +17,7 @@ import unittest
 import yaml
 
 import containerfile
+import secure
 
 CHART = pathlib.Path(__file__).resolve().parents[2] / "deploy/helm/strata"
 INCLUDE = re.compile(r'include \(print \$\.Template\.BasePath "/([\w.]+)"\) \.')
@@ -71,6 +73,14 @@ class Template:
                 raise AssertionError(f"filter {name} is not one that this test knows")
         return str(value)
 
+    def holds(self, condition, dot):
+        """PATH, not PATH, or CONDITION CONDITION …"""
+        if condition.startswith("or "):
+            return any([self.holds(part.strip("()"), dot) for part in re.findall(r"\([^()]*\)|[^\s()]+", condition)[1:]])
+        words = condition.split()
+        assert words[:-1] in ([], ["not"]), f"condition {condition} is not one that this test knows"
+        return bool(self.value(words[-1], dot)) != bool(words[:-1])
+
     def render(self, begin=0, dot=None, quiet=False):
         """Up to the end of the file, or `else` or `end`; the text, where that is, and which."""
         out, at = [], begin
@@ -90,13 +100,13 @@ class Template:
 
     def block(self, action, at, dot, quiet):
         """An if or a range with all it holds: its text, and where its end is."""
-        word, *rest = action.split()
-        value = None if quiet else self.value(rest[-1], dot)
+        word, _, rest = action.partition(" ")
         if word == "range":
+            value = None if quiet else self.value(rest, dot)
             texts = [self.render(at + 1, item)[0] for item in value or ()]
             _, end, _ = self.render(at + 1, dot, quiet=True)
             return "".join(texts), end
-        holds = not value if rest[0] == "not" else bool(value)
+        holds = not quiet and self.holds(rest, dot)
         text, end, which = self.render(at + 1, dot, quiet or not holds)
         other = ""
         if which == "else":
@@ -165,7 +175,7 @@ EVERYTHING = {"tlsSecret": "tls", "tokensSecret": "tokens", "web": {"names": ["m
 
 class ChartTest(unittest.TestCase):
     def test_every_field_is_one_of_kubernetes(self):
-        for changes in ({}, EVERYTHING, {"web": {"enabled": False}, "backup": {"enabled": True}}):
+        for changes in ({}, EVERYTHING, {**EVERYTHING, "metrics": {"open": True}}, {"web": {"enabled": False}, "backup": {"enabled": True}}):
             for kind, document in rendered(**changes).items():
                 known = {"apiVersion": None, "kind": None, "metadata": META, **SPECS[document["apiVersion"], kind]}
                 self.assertEqual(strangers(document, known, kind), [])
@@ -237,6 +247,30 @@ class ChartTest(unittest.TestCase):
             values = (CHART / "values.yaml").read_text()
             for said in (f"key `{item['key']}`", "DNS:" + host.replace("maps", "RELEASE")):
                 self.assertIn(said, values)
+
+    def test_stratad_takes_the_configuration_with_secrets(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            key, certificate = secure.certificate(folder, secure.authority(folder, "ca"), "tls")
+            tokens = folder / "tokens"
+            subprocess.run([os.environ["STRATA_STRATAD"], "token", "add", "--tokens", tokens, "robot", "--right", "read", "--all-maps"],
+                           check=True, capture_output=True)
+            for is_open in (False, True):
+                made = rendered(**EVERYTHING, metrics={"open": is_open})
+                text = made["ConfigMap"]["data"]["stratad.conf"]
+                for inside, here in (("/var/lib/strata", folder), ("/etc/strata/tls/tls.crt", certificate), ("/etc/strata/tls/tls.key", key),
+                                     ("/etc/strata/tokens/tokens", tokens)):
+                    self.assertIn(f'"{inside}"', text)
+                    text = text.replace(inside, str(here))
+                config = folder / "stratad.conf"
+                config.write_text(text)
+                pod = made["StatefulSet"]["spec"]["template"]
+                container, = pod["spec"]["containers"]
+                checked = containerfile.check(container.get("args", []), config)
+                self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+                for told in ("metrics =" in text, "prometheus.io/port" in pod["metadata"]["annotations"],
+                             "metrics" in [port["name"] for port in container["ports"]]):
+                    self.assertEqual(told, is_open)
 
     def test_with_tls_and_tokens_nothing_is_insecure(self):
         made = rendered(**EVERYTHING)
