@@ -13,6 +13,8 @@ packages=(
 )
 # prometheus is there for its promtool, etcd-server and postgresql-15 for tests that start their own; where systemd runs they serve at this
 # machine's ports 9090, 2379 and 5432 until `systemctl disable --now prometheus etcd postgresql`.
+# The viewer's nodejs and npm, and the chromium of its tests (tests/run.sh --full), are left to whoever wants it: what npm needs is hundreds of
+# packages, a nodejs of other origin has its own npm and conflicts with Debian's, and the gate installs --dev.
 # strata-ros2 is built where cyclonedds-dev and cyclonedds-tools are; libfastrtps-dev is the robot that it is tried on.
 if [[ "${1:-}" == --dev ]]; then
   packages+=(clang clang-format clang-tidy coinor-libclp-dev coinor-libipopt-dev cyclonedds-dev cyclonedds-tools dpkg-dev etcd-server file fish libbenchmark-dev libcgal-dev libclang-rt-dev libdlib-dev libfastrtps-dev libgdal-dev libgmock-dev libgtest-dev liboctomap-dev libtinygltf-dev mandoc mmdebstrap mypy openssl patroni postgresql-15 prometheus python3-etcd python3-grpcio python3-numpy python3-pip python3-protobuf python3-setuptools python3-venv python3-wheel python3-xarray python3-xxhash python3-yaml python3-zstandard sqlite3 systemd zsh)

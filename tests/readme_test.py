@@ -32,7 +32,7 @@ sys.path.insert(0, str(ROOT / "tests/support"))
 from postgres_database import Database  # noqa: E402, from the folder above
 
 TOUR = ["docs/quickstart.md", "docs/concepts.md", "docs/profiles.md", "docs/howto/georeference.md", "docs/howto/floorplan.md",
-        "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
+        "docs/howto/mesh.md", "docs/howto/label.md", "docs/howto/fleet.md", "docs/errors.md"]
 DATABASE_PAGE = "docs/howto/postgresql.md"
 
 
@@ -130,6 +130,7 @@ def main():
     own = {"STRATA_SERVER": free_address(), "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(201 + os.getpid() % 30)}
     web = {"STRATA_SERVER": free_address(), "STRATA_WEB": free_address()}
     tours = [(["README.md"], {}), (TOUR, {"STRATA_SERVER": free_address()}), (["docs/exports.md"], {}), (["docs/command-line.md"], {}), (["docs/recordings.md"], {}),
+             (["docs/explore.md", "docs/shapes.md"], {}), (["docs/surveys.md"], {}), (["docs/objects.md"], {}),
              (["docs/ros2.md"], own), (["docs/web.md"], web)]
     if options.list:
         print(*(tour[0] for tour, _ in tours), DATABASE_PAGE, sep="\n")

@@ -1,8 +1,10 @@
 """The Helm chart rendered, and what comes out held to the fields that Kubernetes knows.
 
 Neither helm nor a cluster's API is in Debian 12 (kubectl --dry-run=client asks a cluster, too), so the few template actions that
-the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if, range, end.
+the chart uses are carried out here, and any other is a fault: {{ .Path }}, {{ . }}, | quote, toYaml … | nindent N, if (not,
+or), range, end, include of another file | sha256sum.
 """
+import hashlib
 import json
 import os
 import pathlib
@@ -14,7 +16,11 @@ import unittest
 
 import yaml
 
+import containerfile
+import secure
+
 CHART = pathlib.Path(__file__).resolve().parents[2] / "deploy/helm/strata"
+INCLUDE = re.compile(r'include \(print \$\.Template\.BasePath "/([\w.]+)"\) \.')
 ACTION = re.compile(r"(\s*)\{\{(-?)\s*(.*?)\s*\}\}", re.S)
 
 
@@ -51,17 +57,29 @@ class Template:
         first, *filters = [part.strip() for part in action.split("|")]
         if first.startswith("toYaml "):
             value = yaml.safe_dump(self.value(first.split()[1], dot), default_flow_style=False).rstrip("\n")
+        elif included := INCLUDE.fullmatch(first):
+            value = Template((CHART / "templates" / included[1]).read_text(), self.scope).render()[0]
         else:
             assert re.fullmatch(r"\.[\w.]*", first), f"action {{{{ {action} }}}} is not one that this test knows"
             value = self.value(first, dot)
         for name in filters:
             if name == "quote":
                 value = json.dumps(str(value))
+            elif name == "sha256sum":
+                value = hashlib.sha256(value.encode()).hexdigest()
             elif match := re.fullmatch(r"nindent (\d+)", name):
                 value = "".join("\n" + " " * int(match[1]) + line for line in str(value).split("\n"))
             else:
                 raise AssertionError(f"filter {name} is not one that this test knows")
         return str(value)
+
+    def holds(self, condition, dot):
+        """PATH, not PATH, or CONDITION CONDITION …"""
+        if condition.startswith("or "):
+            return any([self.holds(part.strip("()"), dot) for part in re.findall(r"\([^()]*\)|[^\s()]+", condition)[1:]])
+        words = condition.split()
+        assert words[:-1] in ([], ["not"]), f"condition {condition} is not one that this test knows"
+        return bool(self.value(words[-1], dot)) != bool(words[:-1])
 
     def render(self, begin=0, dot=None, quiet=False):
         """Up to the end of the file, or `else` or `end`; the text, where that is, and which."""
@@ -82,13 +100,13 @@ class Template:
 
     def block(self, action, at, dot, quiet):
         """An if or a range with all it holds: its text, and where its end is."""
-        word, *rest = action.split()
-        value = None if quiet else self.value(rest[-1], dot)
+        word, _, rest = action.partition(" ")
         if word == "range":
+            value = None if quiet else self.value(rest, dot)
             texts = [self.render(at + 1, item)[0] for item in value or ()]
             _, end, _ = self.render(at + 1, dot, quiet=True)
             return "".join(texts), end
-        holds = not value if rest[0] == "not" else bool(value)
+        holds = not quiet and self.holds(rest, dot)
         text, end, which = self.render(at + 1, dot, quiet or not holds)
         other = ""
         if which == "else":
@@ -127,7 +145,7 @@ POD = {
                                        "capabilities": {"drop": None}},
                    "volumeMounts": {"name": None, "mountPath": None, "subPath": None}},
     "volumes": {"name": None, "emptyDir": None, "configMap": {"name": None}, "persistentVolumeClaim": {"claimName": None},
-                "secret": {"secretName": None, "defaultMode": None}},
+                "secret": {"secretName": None, "defaultMode": None, "items": {"key": None, "path": None}}},
 }
 SPECS = {
     ("v1", "ConfigMap"): {"data": None},
@@ -157,7 +175,7 @@ EVERYTHING = {"tlsSecret": "tls", "tokensSecret": "tokens", "web": {"names": ["m
 
 class ChartTest(unittest.TestCase):
     def test_every_field_is_one_of_kubernetes(self):
-        for changes in ({}, EVERYTHING, {"web": {"enabled": False}, "backup": {"enabled": True}}):
+        for changes in ({}, EVERYTHING, {**EVERYTHING, "metrics": {"open": True}}, {"web": {"enabled": False}, "backup": {"enabled": True}}):
             for kind, document in rendered(**changes).items():
                 known = {"apiVersion": None, "kind": None, "metadata": META, **SPECS[document["apiVersion"], kind]}
                 self.assertEqual(strangers(document, known, kind), [])
@@ -202,16 +220,62 @@ class ChartTest(unittest.TestCase):
             with tempfile.TemporaryDirectory() as folder:
                 config = pathlib.Path(folder) / "stratad.conf"
                 config.write_text(made["ConfigMap"]["data"]["stratad.conf"].replace("/var/lib/strata", folder))
-                arguments = made["StatefulSet"]["spec"]["template"]["spec"]["containers"][0]["args"]
-                self.assertEqual(arguments[:2], ["--config", "/etc/strata/stratad.conf"])
-                checked = subprocess.run([os.environ["STRATA_STRATAD"], "check", "--config", config, *arguments[2:]],
-                                         capture_output=True, text=True, check=False)
+                container, = made["StatefulSet"]["spec"]["template"]["spec"]["containers"]
+                checked = containerfile.check(container.get("args", []), config)
                 self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_a_changed_configuration_restarts_the_pod(self):
+        def pod(**changes):
+            return rendered(**changes)["StatefulSet"]["spec"]["template"]
+        self.assertNotEqual(pod(), pod(config="cache = 320\n"))
+        self.assertEqual(pod(), pod(backup={"keep": 3}))
+
+    def test_the_backup_has_the_authority_of_a_certificate(self):
+        """A Secret of type kubernetes.io/tls has tls.crt and tls.key, and ca.crt only by who adds it."""
+        for backup, secret in (({}, "tls"), ({"caSecret": "authority"}, "authority")):
+            made = rendered(tlsSecret="tls", backup={"enabled": True, **backup})
+            job = made["CronJob"]["spec"]["jobTemplate"]["spec"]["template"]["spec"]
+            container, = job["containers"]
+            settings = {entry["name"]: entry["value"] for entry in container["env"]}
+            mount, = (mount for mount in container["volumeMounts"] if mount["name"] == "ca")
+            volume, = (volume for volume in job["volumes"] if volume["name"] == "ca")
+            item, = volume["secret"]["items"]
+            self.assertEqual(volume["secret"]["secretName"], secret)
+            self.assertEqual(settings["STRATA_BACKUP_OPTIONS"], f"--tls-ca {mount['mountPath']}/{item['path']}")
+            host = settings["STRATA_SERVER"].partition(":")[0]
+            self.assertEqual(host, made["Service"]["metadata"]["name"])
+            values = (CHART / "values.yaml").read_text()
+            for said in (f"key `{item['key']}`", "DNS:" + host.replace("maps", "RELEASE")):
+                self.assertIn(said, values)
+
+    def test_stratad_takes_the_configuration_with_secrets(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            key, certificate = secure.certificate(folder, secure.authority(folder, "ca"), "tls")
+            tokens = folder / "tokens"
+            subprocess.run([os.environ["STRATA_STRATAD"], "token", "add", "--tokens", tokens, "robot", "--right", "read", "--all-maps"],
+                           check=True, capture_output=True)
+            for is_open in (False, True):
+                made = rendered(**EVERYTHING, metrics={"open": is_open})
+                text = made["ConfigMap"]["data"]["stratad.conf"]
+                for inside, here in (("/var/lib/strata", folder), ("/etc/strata/tls/tls.crt", certificate), ("/etc/strata/tls/tls.key", key),
+                                     ("/etc/strata/tokens/tokens", tokens)):
+                    self.assertIn(f'"{inside}"', text)
+                    text = text.replace(inside, str(here))
+                config = folder / "stratad.conf"
+                config.write_text(text)
+                pod = made["StatefulSet"]["spec"]["template"]
+                container, = pod["spec"]["containers"]
+                checked = containerfile.check(container.get("args", []), config)
+                self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+                for told in ("metrics =" in text, "prometheus.io/port" in pod["metadata"]["annotations"],
+                             "metrics" in [port["name"] for port in container["ports"]]):
+                    self.assertEqual(told, is_open)
 
     def test_with_tls_and_tokens_nothing_is_insecure(self):
         made = rendered(**EVERYTHING)
         container, = made["StatefulSet"]["spec"]["template"]["spec"]["containers"]
-        self.assertNotIn("--insecure", container["args"])
+        self.assertNotIn("--insecure", container.get("args", []))
         config = made["ConfigMap"]["data"]["stratad.conf"]
         for line in ('tls-cert = "/etc/strata/tls/tls.crt"', 'tokens = "/etc/strata/tokens/tokens"', 'web-name = "maps.example.org"',
                      'web-name = "maps"', "cache = 160"):

@@ -1,7 +1,6 @@
 """What deploy/ asks Prometheus for is what stratad tells: every metric and label of the alerts and of the board; and the rules, by
 promtool's unit tests."""
 import json
-import os
 import pathlib
 import re
 import shutil
@@ -13,6 +12,7 @@ import urllib.request
 import numpy as np
 import yaml
 
+import containerfile
 import strata
 from secure import SecureStratad
 
@@ -141,9 +141,14 @@ class ComposeTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "stratad.conf"
             config.write_text((DEPLOY / "stratad.conf").read_text().replace("/var/lib/strata", folder))
-            checked = subprocess.run([os.environ["STRATA_STRATAD"], "check", "--config", config, *command[2:]], capture_output=True, text=True,
-                                     check=False)
+            checked = containerfile.check(command, config)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_the_image_has_the_viewer(self):
+        """Its target is there where cmake found node and npm, and packages take along what was built before them."""
+        build = containerfile.CONTAINERFILE.read_text()
+        steps = [build.index(step) for step in ("nodejs npm", "cmake --preset release", "--target viewer", "cpack")]
+        self.assertEqual(steps, sorted(steps))
 
     def test_prometheus_scrapes_what_stratad_opens(self):
         compose = yaml.safe_load((COMPOSE / "compose.yml").read_text())
