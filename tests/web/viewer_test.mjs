@@ -101,6 +101,7 @@ async function planBothWays(server, page, camera, from, to, name) {
   await click(page, from);
   await page.waitForFunction("strata.levels !== null", { timeout: 120000 });
   const levels = await page.evaluate("strata.levels");
+  const said = await page.$$eval("#levels li", (items) => items.map((item) => item.textContent));
   await click(page, to);
   await page.waitForFunction("strata.plan !== null", { timeout: 120000 });
   await drawn(page);
@@ -111,7 +112,7 @@ async function planBothWays(server, page, camera, from, to, name) {
   expect(plan.found, `${name}: a path of ${plan.length.toFixed(2)} m (${await message(page)})`);
   expect(Math.abs(plan.length - told.length_m) < 0.1, `${name}: that of the CLI, ${told.length_m.toFixed(2)} m`);
   expect(Math.hypot(plan.from.x - from.x, plan.from.y - from.y) < 0.5, `${name}: it begins where the click was`);
-  return { plan, levels };
+  return { plan, levels, said };
 }
 
 async function testDecoder(server) {
@@ -154,6 +155,8 @@ async function testMap(server, page) {
   await page.keyboard.press("2");
   await drawn(page);
   expect((await pixels()) !== before && (await page.$eval("body", (node) => node.dataset.layer)) === "height", "the key 2 colours by height");
+  const scale = await page.$$eval("#scale-low, #scale-high", (ends) => ends.map((end) => end.textContent));
+  expect(scale.every((end) => /^(?!-0\.00)-?\d+\.\d\d m$/.test(end)) && parseFloat(scale[1]) > 3, `and says of which: ${scale.join(" to ")}`);
   await picture(page, "height");
   await page.keyboard.press("7");
   await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^\d{4}-\d\d-\d\d /.test(node.textContent)));
@@ -193,9 +196,10 @@ async function testMouse(page) {
   await drag("left");
   const moved = await view();
   expect(Math.hypot(moved[3] - turned[3], moved[4] - turned[4]) > 1, "the left button moves it");
-  for (const [key, layer] of [["3", "class"], ["4", "confidence"], ["5", "sigma"]]) {
+  for (const [key, layer, legend] of [["3", "class", "no class"], ["4", "confidence", "0 % 100 %"], ["5", "sigma", "1 mm 1 m"]]) {
     await page.keyboard.press(key);
-    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer, `the key ${key} colours by ${layer}`);
+    const told = await page.$$eval(".legend", (all) => all.filter((one) => one.checkVisibility()).map((one) => one.textContent.trim().replace(/\s+/g, " ")).join());
+    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer && told === legend, `the key ${key} colours by ${layer}: ${told}`);
   }
   await page.keyboard.press("1");
   const client = await page.createCDPSession();
@@ -211,7 +215,8 @@ async function testMouse(page) {
 
 async function testPlans(server, page) {
   const above = [0, -30, 30, 0, 0, 0];
-  const { levels } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
+  const { levels, said } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
+  expect(/: drivable, 0\.\d\d m deep$/.test(said[0]) && /: drivable/.test(said.at(-1)), `both are drivable: ${said.join("; ")}`);
   const heights = levels.map((surface) => surface.z_m ?? 0); // JSON leaves out what is 0
   expect(heights[0] > 3 && heights.at(-1) < 0.5, `on the deck there are levels at ${heights.map((z) => z.toFixed(2)).join(" and ")} m`);
   await planBothWays(server, page, above, { x: 0, y: -14, z: 0 }, { x: 0, y: 14, z: 0 }, "under");
@@ -240,8 +245,8 @@ async function testPlans(server, page) {
   });
   await page.mouse.click(...far);
   await page.waitForFunction("strata.plan !== null", { timeout: 120000 });
-  const said = await message(page);
-  expect(said.startsWith("no path: ") && said.length > 20, said);
+  const why = await message(page);
+  expect(why.startsWith("no path: ") && why.length > 20, why);
   await picture(page, "no_path");
 }
 
@@ -421,7 +426,44 @@ async function testObjects(server, browser) {
   await within(5000, `${listed} boxes, as many as the CLI lists`, async () => listed > 0 && (await boxes()) === listed);
   await drawn(page);
   await picture(page, "objects");
+  await testClasses(server, page);
   await page.close();
+}
+
+// What somebody called class 2, and in which colour.
+async function testClasses(server, page) {
+  const legend = () => page.$$eval("#class-legend span", (all) => all.map((one) => [one.textContent.trim(), one.firstChild.style.background]));
+  const painted = (colour) => page.evaluate((wanted) => {
+    let count = 0;
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, texture, count: size } } of group.children) for (let i = 0; i < size; ++i) count += ((rows[4 * i] >> 20) & 255) === 2 && (texture.image.data[4 * i + 3] & 0xffffff) === wanted;
+    return count;
+  }, colour);
+  await page.keyboard.press("3");
+  await within(5000, "the classes that are seen are in the legend, by number where they have no name", async () => (await legend()).some(([name]) => name === "2"));
+  server.strata("map", "classes", "things", "--set", "2=facade:#c08040");
+  await page.keyboard.press("3");
+  await within(5000, "by name where they have one, and in its colour", async () => (await legend()).some(([name, colour]) => name === "facade" && colour === "rgb(192, 128, 64)"));
+  expect((await painted(0x4080c0)) > 100, `as ${await painted(0x4080c0)} surfaces are`);
+  await drawn(page);
+  await picture(page, "classes");
+  await page.reload(); // things are described when they are read
+  await page.waitForFunction("window.strata?.begun", { timeout: 120000 });
+  await within(20000, "objects have a switch", () => layerSwitch(page, "objects"));
+  await press(page, '#switches input[data-layer="objects"]');
+  const objects = await page.evaluate(() => strata.hover.layers.get("objects").map(({ text }) => text));
+  expect(objects.some((text) => /, class facade/.test(text)) && !objects.some((text) => /, class 2\b/.test(text)), `and things: ${objects[0]}`);
+  await page.evaluate(async () => { // the middle of a wall's surface
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; i += 7) {
+      if (((rows[4 * i] >> 20) & 255) !== 2) continue;
+      const { origin, size } = group.userData;
+      strata.wall = { x: origin.x + ((rows[4 * i] & 255) + 0.5) * size, y: origin.y + (((rows[4 * i] >> 8) & 255) + 0.5) * size, z: rows[4 * i + 1] / 512 };
+      return;
+    }
+  });
+  await page.evaluate(() => strata.stage.look([strata.wall.x, strata.wall.y - 1, strata.wall.z + 20, strata.wall.x, strata.wall.y, strata.wall.z]));
+  await drawn(page);
+  await click(page, await page.evaluate("strata.wall"));
+  await within(5000, "a click names it, too", () => page.$$eval("#levels li", (items) => items.some((item) => /, class facade \(\d+ %\)/.test(item.textContent))));
 }
 
 // The sides and the top of a block, of which no point is beyond `most` along x; labelled, as PLY.

@@ -33,6 +33,7 @@ const jobs = new Jobs(() => layersSoon());
 function showState({ scans, epoch, inferred } = {}) {
   if (!view) return;
   if (scans || epoch || inferred) layersSoon();
+  colours.showLegend();
   const levels = [...new Set(view.shown().map(({ decoded }) => decoded.level))].sort((a, b) => a - b);
   const detail = levels.length > 1 || levels[0] ? `, levels of detail ${levels.join(" ")}` : "";
   el("state").textContent = `${view.shown().length} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;
@@ -75,6 +76,7 @@ function layersSoon(ms = 1000) {
 
 async function drawLayers(of) {
   jobs.setCurrent(await listEpochs(of, stage, jobs));
+  await colours.findClasses();
   const graph = await drawGraph(of, stage, switches, hover);
   state.runs = graph.runs;
   colours.setScans(graph.scans);
