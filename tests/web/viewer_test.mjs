@@ -255,9 +255,24 @@ async function testLink(server, browser, page) {
   await page.keyboard.press("l");
   const url = await page.evaluate("location.href");
   const other = await open(browser, url);
+  expect(url.includes("cut="), "it has the height that is cut off");
   const [a, b] = await Promise.all([page, other].map((p) => p.evaluate("[...strata.stage.view(), document.body.dataset.layer, document.getElementById('cut-value').textContent].join()")));
   expect(a.split(",").slice(6).join() === b.split(",").slice(6).join() && url.includes("map=bridge"), `a link shows the same view: ${url.slice(0, 110)}`);
   await other.close();
+  await page.keyboard.press("6");
+  await within(20000, "floors are found", () => page.evaluate("strata.floors > 1"));
+  await page.select("#floor", "1");
+  for (const name of ["trajectories", "scans"]) await press(page, `#switches input[data-layer="${name}"]`);
+  await page.keyboard.press("l");
+  const third = await open(browser, await page.evaluate("location.href"));
+  const seen = (on) => on.evaluate(() => [document.getElementById("floor").value, document.getElementById("cut-value").textContent, ...[...document.querySelectorAll("#switches input:checked")].map((box) => box.dataset.layer)].join());
+  const here = await seen(page);
+  expect(/^1,\d.*of the floor,scans$/.test(here), `one floor alone and other switches: ${here}`);
+  await within(20000, "a link has those, too", async () => (await seen(third)) === here);
+  await third.close();
+  for (const name of ["trajectories", "scans"]) await press(page, `#switches input[data-layer="${name}"]`);
+  await page.select("#floor", "");
+  await page.keyboard.press("1");
 }
 
 // Of a pyramid of 64 × 64 tiles, without a browser: what is chosen covers every place once.
