@@ -66,9 +66,16 @@ async function serve(name, ...more) {
   return server;
 }
 
+// Poses of a simulation begin at 0 s; these in 2026, as a robot's whose clock is right.
+function dateThePoses(file) {
+  const lines = fs.readFileSync(file, "utf8").split("\n").map((line) => (/^\d/.test(line) ? line.replace(/ \S+/, (time) => ` ${(Number(time) + 1767225600).toFixed(6)}`) : line));
+  fs.writeFileSync(file, lines.join("\n"));
+}
+
 async function mapTheBridge() {
   const simulate = path.join(build, "tests/support/strata-simulate");
   execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--step", "2", "--noise-m", "0.02", "--noise-rad", "0.003"]);
+  for (const robot of ["over", "under"]) dateThePoses(path.join(work, "world", robot, "poses_initial.txt"));
   const server = await serve("maps");
   server.strata("map", "create", "bridge", "--cell-size", "0.1");
   server.import = (robot, as) => server.strata("scan", "import", "bridge", path.join(work, "world", robot, "scans"), "--poses", path.join(work, "world", robot, "poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", as, "--align", "on", "--wait");
@@ -159,7 +166,7 @@ async function testMap(server, page) {
   expect(scale.every((end) => /^(?!-0\.00)-?\d+\.\d\d m$/.test(end)) && parseFloat(scale[1]) > 3, `and says of which: ${scale.join(" to ")}`);
   await picture(page, "height");
   await page.keyboard.press("7");
-  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^\d{4}-\d\d-\d\d /.test(node.textContent)));
+  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^2026-01-01 /.test(node.textContent)));
   const codes = await page.evaluate(() => {
     const seen = new Set();
     for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; ++i) seen.add(rows[4 * i + 3] >>> 24);
@@ -413,7 +420,7 @@ async function testPanels(server, page) {
   }
   const [x, y] = await page.evaluate(() => strata.hover.layers.get("scans").map((scan) => strata.stage.pixelOf(scan)).find(([x, y]) => x > 400 && x < 1200 && y > 100 && y < 700));
   await page.mouse.move(x, y);
-  await within(3000, "the scan under the pointer is named, with its time", () => page.$eval("#hover", (label) => !label.hidden && /^scan \w+\/\d+, \d{4}-/.test(label.textContent)));
+  await within(3000, "the scan under the pointer is named, with its time", () => page.$eval("#hover", (label) => !label.hidden && /^scan \w+\/\d+, 2026-01-01 /.test(label.textContent)));
   await page.keyboard.press("6");
   await within(20000, "floors are found", () => page.evaluate("strata.floors > 1"));
   await drawn(page);
@@ -442,6 +449,7 @@ async function testObjects(server, browser) {
   await drawn(page);
   await picture(page, "objects");
   await testClasses(server, page);
+  await testNoDates(page);
   await page.close();
 }
 
@@ -479,6 +487,69 @@ async function testClasses(server, page) {
   await drawn(page);
   await click(page, await page.evaluate("strata.wall"));
   await within(5000, "a click names it, too", () => page.$$eval("#levels li", (items) => items.some((item) => /, class facade \(\d+ %\)/.test(item.textContent))));
+}
+
+// The times of this map's scans are those since a robot's start.
+async function testNoDates(page) {
+  await page.keyboard.press("7");
+  await within(5000, "of times that are none of a calendar no date is said", () => page.$eval("#time-first", (node) => node.textContent === "no scan has a date"));
+  const scans = await page.evaluate(() => strata.hover.layers.get("scans").map(({ text }) => text));
+  expect(scans.length > 0 && scans.every((text) => /^scan over\/\d+(, [a-z]+)?$/.test(text)), `nor of scans: ${scans[0]}`);
+}
+
+// The list has all maps at once, and of each what the server says of it.
+async function testMapList(server, browser) {
+  const rows = (page) => page.$$eval("#maps tbody tr", (all) => all.map((row) => [...row.cells].map((cell) => cell.textContent)));
+  const page = await browser.newPage();
+  await page.setRequestInterception(true);
+  const held = [];
+  const calls = [];
+  page.on("request", (request) => {
+    calls.push(request.url().replace(/.*\./, ""));
+    const name = /Maps\/Stats$/.test(request.url()) ? JSON.parse(request.postData()).name : "";
+    if (name === "bridge") held.push(request);
+    else if (name === "halves") request.respond({ status: 429, contentType: "application/json", body: JSON.stringify({ code: "resource_exhausted", message: "1 map is open" }) });
+    else request.continue();
+  });
+  await page.goto(server.url);
+  await page.waitForFunction("window.strata?.begun", { timeout: 120000 });
+  await within(5000, "maps are listed while one is being counted, and one cannot be", async () => held.length === 1 && (await rows(page)).some(([name, scans]) => name === "things" && scans === "8"));
+  const listed = await rows(page);
+  expect(listed.length === 3 && listed.every(([name, scans, size, age]) => age && (name === "things" || (scans === "–" && size === "–"))), listed.map((row) => row.join(" ")).join("; "));
+  held[0].continue();
+  const told = server.strata("map", "list").split("\n").map((line) => line.split(/ {2,}/));
+  await within(5000, "sizes are those of the CLI", async () => (await rows(page)).filter(([name]) => name !== "halves").every(([name, scans, size]) => told.some(([its, count, , bytes]) => its === name && count === scans && bytes === size)));
+  console.log(`     ${(await rows(page)).map((row) => row.join(" ")).join("; ")}`);
+  await page.$eval('#maps button[aria-label="open map things"]', (button) => button.click());
+  await within(20000, "a map that is chosen is in the address", () => page.evaluate("strata.ready && location.hash === '#map=things'"));
+  calls.length = 0;
+  await page.reload();
+  await within(20000, "and opened again by it", () => page.evaluate("window.strata?.begun && strata.view.name === 'things'"));
+  await within(5000, "before any is counted", () => calls.includes("Maps/Stats"));
+  expect(calls.indexOf("Maps/Watch") >= 0 && calls.indexOf("Maps/Watch") < calls.indexOf("Maps/Stats"), calls.filter((name) => /^Maps/.test(name)).join(" "));
+  await page.close();
+}
+
+// Of very many maps the first are counted, few at once.
+async function testManyMaps(server, browser) {
+  const page = await browser.newPage();
+  await page.setRequestInterception(true);
+  let [asked, open, most] = [0, 0, 0];
+  page.on("request", async (request) => {
+    const json = (body) => request.respond({ contentType: "application/json", body: JSON.stringify(body) });
+    if (/Maps\/List$/.test(request.url())) return json({ maps: Array.from({ length: 250 }, (_, i) => ({ name: `map${i}`, created: "2026-01-01T00:00:00Z" })) });
+    if (!/Maps\/Stats$/.test(request.url())) return request.continue();
+    ++asked;
+    most = Math.max(most, ++open);
+    await pause(5);
+    --open;
+    json({ stats: { scans: "7" } });
+  });
+  await page.goto(server.url);
+  await within(10000, "of 250 maps 200 are counted", () => page.$$eval("#maps tbody tr", (all) => all.length === 250 && all[199].cells[1].textContent === "7" && all[200].cells[1].textContent === "–"));
+  await pause(200);
+  expect(asked === 200 && most <= 3, `${asked} calls, ${most} at once`);
+  await page.close();
 }
 
 // The sides and the top of a block, of which no point is beyond `most` along x; labelled, as PLY.
@@ -699,6 +770,8 @@ try {
   }
   await testObjects(server, browser);
   await testInferred(server, browser);
+  await testMapList(server, browser);
+  await testManyMaps(server, browser);
   await page.bringToFront();
   await testMeasure(page);
   await testTouchAndKeys(page);

@@ -6,7 +6,7 @@ import { listEpochs } from "./epochs.js";
 import { drawGraph } from "./graph.js";
 import { Hover } from "./hover.js";
 import { Jobs } from "./jobs.js";
-import { listMaps } from "./map_list.js";
+import { countMaps, listMaps } from "./map_list.js";
 import { MapView } from "./map_view.js";
 import { drawModels } from "./models.js";
 import { LAYERS } from "./paint.js";
@@ -210,8 +210,9 @@ function wirePanel() {
 
 // Also after a new token: a map that is open stays, and follows again by itself.
 async function begin() {
+  let maps = [];
   try {
-    const maps = await listMaps(openMap);
+    maps = await listMaps(openMap);
     el("token-form").hidden = true;
     const name = hash.get("map") ?? (maps.length === 1 ? maps[0].name : null);
     if (view && state.ready) clicks.prompt();
@@ -220,6 +221,7 @@ async function begin() {
   } catch (error) {
     say(error.message);
   }
+  countMaps(maps); // after the map asked for: it may be the only one that the server opens
   state.begun = true;
 }
 
