@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -69,6 +70,27 @@ absl::StatusOr<std::string> ReadAsset(const fs::path& file) {
   }
   std::ifstream in(file, std::ios::binary);
   return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+// What the viewer's build packed by gzip; empty where it did not.
+absl::StatusOr<std::string> ReadPacked(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) return std::string();
+  return ReadAsset(file);
+}
+
+// Whether Accept-Encoding has gzip, with a weight above 0.
+bool TakesGzip(const Question& question) {
+  for (const absl::string_view coding : absl::StrSplit(question.Header("accept-encoding"), ',')) {
+    const std::pair<absl::string_view, absl::string_view> parts =
+        absl::StrSplit(coding, absl::MaxSplits(';', 1));
+    if (!absl::EqualsIgnoreCase(absl::StripAsciiWhitespace(parts.first), "gzip")) continue;
+    absl::string_view weight = absl::StripAsciiWhitespace(parts.second);
+    if (weight.empty()) return true;
+    double value = 0.0;
+    return absl::ConsumePrefix(&weight, "q=") && absl::SimpleAtod(weight, &value) && value > 0.0;
+  }
+  return false;
 }
 
 // Whether If-None-Match has `etag`, which is one with its quotes.
@@ -170,13 +192,18 @@ absl::StatusOr<std::unique_ptr<Pages>> Pages::Make(const fs::path& viewer,
   std::unique_ptr<Pages> pages(new Pages(stub, count));
   pages->openapi_ = OpenApiOf(contract);
   if (viewer.empty()) {
-    pages->files_["/"] = {kAssets[0].type, kNoViewer, ""};
+    pages->files_["/"] = {kAssets[0].type, {kNoViewer, ""}, {}};
     return pages;
   }
   for (const Asset& asset : kAssets) {
     STRATA_ASSIGN_OR_RETURN(std::string body, ReadAsset(viewer / asset.file));
+    STRATA_ASSIGN_OR_RETURN(std::string packed,
+                            ReadPacked(viewer / absl::StrCat(asset.file, ".gz")));
     std::string etag = absl::StrCat("\"", TagOf(body), "\"");
-    pages->files_[asset.path] = {asset.type, std::move(body), std::move(etag)};
+    std::string packed_etag = absl::StrCat("\"", TagOf(packed), "\"");
+    pages->files_[asset.path] = {asset.type,
+                                 {std::move(body), std::move(etag)},
+                                 {std::move(packed), std::move(packed_etag)}};
   }
   return pages;
 }
@@ -197,8 +224,11 @@ std::shared_ptr<Exchange> Pages::Handle(const Question& question,
     return nullptr;
   }
   const File& file = files_.find(question.path)->second;
-  sink->Send(
-      WithTag(question, file.etag, "no-cache", {200, {{"Content-Type", file.type}}, file.body}));
+  const bool packed = !file.packed.body.empty() && TakesGzip(question);
+  const Bytes& bytes = packed ? file.packed : file.plain;
+  Answer answer{200, {{"Content-Type", file.type}, {"Vary", "Accept-Encoding"}}, bytes.body};
+  if (packed) answer.headers.emplace_back("Content-Encoding", "gzip");
+  sink->Send(WithTag(question, bytes.etag, "no-cache", std::move(answer)));
   return nullptr;
 }
 

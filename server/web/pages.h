@@ -48,10 +48,14 @@ class Pages {
                                    const std::shared_ptr<AnswerSink>& sink) const;
 
  private:
-  struct File {
-    std::string type;
+  struct Bytes {
     std::string body;
     std::string etag;
+  };
+  struct File {
+    std::string type;
+    Bytes plain;
+    Bytes packed;  // by gzip; empty where the viewer's build made none
   };
 
   Pages(grpc::GenericStub& stub, CallCount& count) : stub_(stub), count_(count) {}

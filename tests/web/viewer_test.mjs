@@ -8,7 +8,7 @@ import fs from "node:fs";
 import os from "node:os";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
-import { gzipSync } from "node:zlib";
+import { gunzipSync } from "node:zlib";
 
 const options = Object.fromEntries(process.argv.slice(2).map((word, i, all) => [word, all[i + 1]]));
 const build = path.resolve(options["--build"] ?? "build/release");
@@ -66,9 +66,16 @@ async function serve(name, ...more) {
   return server;
 }
 
+// Poses of a simulation begin at 0 s; these in 2026, as a robot's whose clock is right.
+function dateThePoses(file) {
+  const lines = fs.readFileSync(file, "utf8").split("\n").map((line) => (/^\d/.test(line) ? line.replace(/ \S+/, (time) => ` ${(Number(time) + 1767225600).toFixed(6)}`) : line));
+  fs.writeFileSync(file, lines.join("\n"));
+}
+
 async function mapTheBridge() {
   const simulate = path.join(build, "tests/support/strata-simulate");
   execFileSync(simulate, ["bridge", path.join(work, "world"), "--seed", "1", "--step", "2", "--noise-m", "0.02", "--noise-rad", "0.003"]);
+  for (const robot of ["over", "under"]) dateThePoses(path.join(work, "world", robot, "poses_initial.txt"));
   const server = await serve("maps");
   server.strata("map", "create", "bridge", "--cell-size", "0.1");
   server.import = (robot, as) => server.strata("scan", "import", "bridge", path.join(work, "world", robot, "scans"), "--poses", path.join(work, "world", robot, "poses_initial.txt"), "--pose-format", "index-tum", "--trajectory", as, "--align", "on", "--wait");
@@ -101,6 +108,7 @@ async function planBothWays(server, page, camera, from, to, name) {
   await click(page, from);
   await page.waitForFunction("strata.levels !== null", { timeout: 120000 });
   const levels = await page.evaluate("strata.levels");
+  const said = await page.$$eval("#levels li", (items) => items.map((item) => item.textContent));
   await click(page, to);
   await page.waitForFunction("strata.plan !== null", { timeout: 120000 });
   await drawn(page);
@@ -111,7 +119,7 @@ async function planBothWays(server, page, camera, from, to, name) {
   expect(plan.found, `${name}: a path of ${plan.length.toFixed(2)} m (${await message(page)})`);
   expect(Math.abs(plan.length - told.length_m) < 0.1, `${name}: that of the CLI, ${told.length_m.toFixed(2)} m`);
   expect(Math.hypot(plan.from.x - from.x, plan.from.y - from.y) < 0.5, `${name}: it begins where the click was`);
-  return { plan, levels };
+  return { plan, levels, said };
 }
 
 async function testDecoder(server) {
@@ -154,9 +162,11 @@ async function testMap(server, page) {
   await page.keyboard.press("2");
   await drawn(page);
   expect((await pixels()) !== before && (await page.$eval("body", (node) => node.dataset.layer)) === "height", "the key 2 colours by height");
+  const scale = await page.$$eval("#scale-low, #scale-high", (ends) => ends.map((end) => end.textContent));
+  expect(scale.every((end) => /^(?!-0\.00)-?\d+\.\d\d m$/.test(end)) && parseFloat(scale[1]) > 3, `and says of which: ${scale.join(" to ")}`);
   await picture(page, "height");
   await page.keyboard.press("7");
-  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^\d{4}-\d\d-\d\d /.test(node.textContent)));
+  await within(3000, "the key 7 colours by time, and says of when", () => page.$eval("#time-first", (node) => /^2026-01-01 /.test(node.textContent)));
   const codes = await page.evaluate(() => {
     const seen = new Set();
     for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; ++i) seen.add(rows[4 * i + 3] >>> 24);
@@ -193,9 +203,10 @@ async function testMouse(page) {
   await drag("left");
   const moved = await view();
   expect(Math.hypot(moved[3] - turned[3], moved[4] - turned[4]) > 1, "the left button moves it");
-  for (const [key, layer] of [["3", "class"], ["4", "confidence"], ["5", "sigma"]]) {
+  for (const [key, layer, legend] of [["3", "class", "no class"], ["4", "confidence", "0 % 100 %"], ["5", "sigma", "1 mm 1 m"]]) {
     await page.keyboard.press(key);
-    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer, `the key ${key} colours by ${layer}`);
+    const told = await page.$$eval(".legend", (all) => all.filter((one) => one.checkVisibility()).map((one) => one.textContent.trim().replace(/\s+/g, " ")).join());
+    expect((await page.$eval("body", (body) => body.dataset.layer)) === layer && told === legend, `the key ${key} colours by ${layer}: ${told}`);
   }
   await page.keyboard.press("1");
   const client = await page.createCDPSession();
@@ -211,7 +222,8 @@ async function testMouse(page) {
 
 async function testPlans(server, page) {
   const above = [0, -30, 30, 0, 0, 0];
-  const { levels } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
+  const { levels, said } = await planBothWays(server, page, above, { x: 0, y: 0, z: 3.4 }, { x: 24, y: 0, z: 0 }, "over");
+  expect(/: drivable, 0\.\d\d m deep$/.test(said[0]) && /: drivable/.test(said.at(-1)), `both are drivable: ${said.join("; ")}`);
   const heights = levels.map((surface) => surface.z_m ?? 0); // JSON leaves out what is 0
   expect(heights[0] > 3 && heights.at(-1) < 0.5, `on the deck there are levels at ${heights.map((z) => z.toFixed(2)).join(" and ")} m`);
   await planBothWays(server, page, above, { x: 0, y: -14, z: 0 }, { x: 0, y: 14, z: 0 }, "under");
@@ -240,8 +252,8 @@ async function testPlans(server, page) {
   });
   await page.mouse.click(...far);
   await page.waitForFunction("strata.plan !== null", { timeout: 120000 });
-  const said = await message(page);
-  expect(said.startsWith("no path: ") && said.length > 20, said);
+  const why = await message(page);
+  expect(why.startsWith("no path: ") && why.length > 20, why);
   await picture(page, "no_path");
 }
 
@@ -250,9 +262,24 @@ async function testLink(server, browser, page) {
   await page.keyboard.press("l");
   const url = await page.evaluate("location.href");
   const other = await open(browser, url);
+  expect(url.includes("cut="), "it has the height that is cut off");
   const [a, b] = await Promise.all([page, other].map((p) => p.evaluate("[...strata.stage.view(), document.body.dataset.layer, document.getElementById('cut-value').textContent].join()")));
   expect(a.split(",").slice(6).join() === b.split(",").slice(6).join() && url.includes("map=bridge"), `a link shows the same view: ${url.slice(0, 110)}`);
   await other.close();
+  await page.keyboard.press("6");
+  await within(20000, "floors are found", () => page.evaluate("strata.floors > 1"));
+  await page.select("#floor", "1");
+  for (const name of ["trajectories", "scans"]) await press(page, `#switches input[data-layer="${name}"]`);
+  await page.keyboard.press("l");
+  const third = await open(browser, await page.evaluate("location.href"));
+  const seen = (on) => on.evaluate(() => [document.getElementById("floor").value, document.getElementById("cut-value").textContent, ...[...document.querySelectorAll("#switches input:checked")].map((box) => box.dataset.layer)].join());
+  const here = await seen(page);
+  expect(/^1,\d.*of the floor,scans$/.test(here), `one floor alone and other switches: ${here}`);
+  await within(20000, "a link has those, too", async () => (await seen(third)) === here);
+  await third.close();
+  for (const name of ["trajectories", "scans"]) await press(page, `#switches input[data-layer="${name}"]`);
+  await page.select("#floor", "");
+  await page.keyboard.press("1");
 }
 
 // Of a pyramid of 64 × 64 tiles, without a browser: what is chosen covers every place once.
@@ -337,7 +364,10 @@ async function testFrames(page) {
 
 // What a browser has to load before it shows anything.
 function testBundle() {
-  const bytes = ["index.html", "viewer.js", "worker.js", "viewer.css"].reduce((sum, file) => sum + gzipSync(fs.readFileSync(path.join(viewer, file)), { level: 9 }).length, 0);
+  const files = ["index.html", "viewer.js", "worker.js", "viewer.css"];
+  const packed = files.map((file) => fs.readFileSync(path.join(viewer, `${file}.gz`)));
+  expect(files.every((file, i) => gunzipSync(packed[i]).equals(fs.readFileSync(path.join(viewer, file)))), "each file is there packed, too");
+  const bytes = packed.reduce((sum, { length }) => sum + length, 0);
   expect(bytes <= 250_000, `the viewer has ${(bytes / 1000).toFixed(0)} kB, packed by gzip`);
 }
 
@@ -393,7 +423,7 @@ async function testPanels(server, page) {
   }
   const [x, y] = await page.evaluate(() => strata.hover.layers.get("scans").map((scan) => strata.stage.pixelOf(scan)).find(([x, y]) => x > 400 && x < 1200 && y > 100 && y < 700));
   await page.mouse.move(x, y);
-  await within(3000, "the scan under the pointer is named, with its time", () => page.$eval("#hover", (label) => !label.hidden && /^scan \w+\/\d+, \d{4}-/.test(label.textContent)));
+  await within(3000, "the scan under the pointer is named, with its time", () => page.$eval("#hover", (label) => !label.hidden && /^scan \w+\/\d+, 2026-01-01 /.test(label.textContent)));
   await page.keyboard.press("6");
   await within(20000, "floors are found", () => page.evaluate("strata.floors > 1"));
   await drawn(page);
@@ -421,6 +451,107 @@ async function testObjects(server, browser) {
   await within(5000, `${listed} boxes, as many as the CLI lists`, async () => listed > 0 && (await boxes()) === listed);
   await drawn(page);
   await picture(page, "objects");
+  await testClasses(server, page);
+  await testNoDates(page);
+  await page.close();
+}
+
+// What somebody called class 2, and in which colour.
+async function testClasses(server, page) {
+  const legend = () => page.$$eval("#class-legend span", (all) => all.map((one) => [one.textContent.trim(), one.firstChild.style.background]));
+  const painted = (colour) => page.evaluate((wanted) => {
+    let count = 0;
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, texture, count: size } } of group.children) for (let i = 0; i < size; ++i) count += ((rows[4 * i] >> 20) & 255) === 2 && (texture.image.data[4 * i + 3] & 0xffffff) === wanted;
+    return count;
+  }, colour);
+  await page.keyboard.press("3");
+  await within(5000, "the classes that are seen are in the legend, by number where they have no name", async () => (await legend()).some(([name]) => name === "2"));
+  server.strata("map", "classes", "things", "--set", "2=facade:#c08040");
+  await page.keyboard.press("3");
+  await within(5000, "by name where they have one, and in its colour", async () => (await legend()).some(([name, colour]) => name === "facade" && colour === "rgb(192, 128, 64)"));
+  expect((await painted(0x4080c0)) > 100, `as ${await painted(0x4080c0)} surfaces are`);
+  await drawn(page);
+  await picture(page, "classes");
+  await page.reload(); // things are described when they are read
+  await page.waitForFunction("window.strata?.begun", { timeout: 120000 });
+  await within(20000, "objects have a switch", () => layerSwitch(page, "objects"));
+  await press(page, '#switches input[data-layer="objects"]');
+  const objects = await page.evaluate(() => strata.hover.layers.get("objects").map(({ text }) => text));
+  expect(objects.some((text) => /, class facade/.test(text)) && !objects.some((text) => /, class 2\b/.test(text)), `and things: ${objects[0]}`);
+  await page.evaluate(async () => { // the middle of a wall's surface
+    for (const { group } of strata.view.shown()) for (const { userData: { rows, count } } of group.children) for (let i = 0; i < count; i += 7) {
+      if (((rows[4 * i] >> 20) & 255) !== 2) continue;
+      const { origin, size } = group.userData;
+      strata.wall = { x: origin.x + ((rows[4 * i] & 255) + 0.5) * size, y: origin.y + (((rows[4 * i] >> 8) & 255) + 0.5) * size, z: rows[4 * i + 1] / 512 };
+      return;
+    }
+  });
+  await page.evaluate(() => strata.stage.look([strata.wall.x, strata.wall.y - 1, strata.wall.z + 20, strata.wall.x, strata.wall.y, strata.wall.z]));
+  await drawn(page);
+  await click(page, await page.evaluate("strata.wall"));
+  await within(5000, "a click names it, too", () => page.$$eval("#levels li", (items) => items.some((item) => /, class facade \(\d+ %\)/.test(item.textContent))));
+}
+
+// The times of this map's scans are those since a robot's start.
+async function testNoDates(page) {
+  await page.keyboard.press("7");
+  await within(5000, "of times that are none of a calendar no date is said", () => page.$eval("#time-first", (node) => node.textContent === "no scan has a date"));
+  const scans = await page.evaluate(() => strata.hover.layers.get("scans").map(({ text }) => text));
+  expect(scans.length > 0 && scans.every((text) => /^scan over\/\d+(, [a-z]+)?$/.test(text)), `nor of scans: ${scans[0]}`);
+}
+
+// The list has all maps at once, and of each what the server says of it.
+async function testMapList(server, browser) {
+  const rows = (page) => page.$$eval("#maps tbody tr", (all) => all.map((row) => [...row.cells].map((cell) => cell.textContent)));
+  const page = await browser.newPage();
+  await page.setRequestInterception(true);
+  const held = [];
+  const calls = [];
+  page.on("request", (request) => {
+    calls.push(request.url().replace(/.*\./, ""));
+    const name = /Maps\/Stats$/.test(request.url()) ? JSON.parse(request.postData()).name : "";
+    if (name === "bridge") held.push(request);
+    else if (name === "halves") request.respond({ status: 429, contentType: "application/json", body: JSON.stringify({ code: "resource_exhausted", message: "1 map is open" }) });
+    else request.continue();
+  });
+  await page.goto(server.url);
+  await page.waitForFunction("window.strata?.begun", { timeout: 120000 });
+  await within(5000, "maps are listed while one is being counted, and one cannot be", async () => held.length === 1 && (await rows(page)).some(([name, scans]) => name === "things" && scans === "8"));
+  const listed = await rows(page);
+  expect(listed.length === 3 && listed.every(([name, scans, size, age]) => age && (name === "things" || (scans === "–" && size === "–"))), listed.map((row) => row.join(" ")).join("; "));
+  held[0].continue();
+  const told = server.strata("map", "list").split("\n").map((line) => line.split(/ {2,}/));
+  await within(5000, "sizes are those of the CLI", async () => (await rows(page)).filter(([name]) => name !== "halves").every(([name, scans, size]) => told.some(([its, count, , bytes]) => its === name && count === scans && bytes === size)));
+  console.log(`     ${(await rows(page)).map((row) => row.join(" ")).join("; ")}`);
+  await page.$eval('#maps button[aria-label="open map things"]', (button) => button.click());
+  await within(20000, "a map that is chosen is in the address", () => page.evaluate("strata.ready && location.hash === '#map=things'"));
+  calls.length = 0;
+  await page.reload();
+  await within(20000, "and opened again by it", () => page.evaluate("window.strata?.begun && strata.view.name === 'things'"));
+  await within(5000, "before any is counted", () => calls.includes("Maps/Stats"));
+  expect(calls.indexOf("Maps/Watch") >= 0 && calls.indexOf("Maps/Watch") < calls.indexOf("Maps/Stats"), calls.filter((name) => /^Maps/.test(name)).join(" "));
+  await page.close();
+}
+
+// Of very many maps the first are counted, few at once.
+async function testManyMaps(server, browser) {
+  const page = await browser.newPage();
+  await page.setRequestInterception(true);
+  let [asked, open, most] = [0, 0, 0];
+  page.on("request", async (request) => {
+    const json = (body) => request.respond({ contentType: "application/json", body: JSON.stringify(body) });
+    if (/Maps\/List$/.test(request.url())) return json({ maps: Array.from({ length: 250 }, (_, i) => ({ name: `map${i}`, created: "2026-01-01T00:00:00Z" })) });
+    if (!/Maps\/Stats$/.test(request.url())) return request.continue();
+    ++asked;
+    most = Math.max(most, ++open);
+    await pause(5);
+    --open;
+    json({ stats: { scans: "7" } });
+  });
+  await page.goto(server.url);
+  await within(10000, "of 250 maps 200 are counted", () => page.$$eval("#maps tbody tr", (all) => all.length === 250 && all[199].cells[1].textContent === "7" && all[200].cells[1].textContent === "–"));
+  await pause(200);
+  expect(asked === 200 && most <= 3, `${asked} calls, ${most} at once`);
   await page.close();
 }
 
@@ -642,6 +773,8 @@ try {
   }
   await testObjects(server, browser);
   await testInferred(server, browser);
+  await testMapList(server, browser);
+  await testManyMaps(server, browser);
   await page.bringToFront();
   await testMeasure(page);
   await testTouchAndKeys(page);

@@ -1,9 +1,16 @@
 // What clicks on the map do: a start and a goal, what is there on all levels; or two ends of a measure.
+import { classNameOf } from "./classes.js";
 import { el, metres, node, say } from "./dom.js";
 import { call } from "./rpc.js";
 
 const TRAVERSABILITY = { TRAVERSABILITY_TRAVERSABLE: "drivable", TRAVERSABILITY_NON_TRAVERSABLE: "not drivable", TRAVERSABILITY_UNDERSIDE: "underside" };
 const MARKS = ["start", "goal", "path", "where", "measure"];
+
+// A surface to drive on may be deep, too: a deck that was seen from below.
+function whatOf({ traversability, depth_m }) {
+  const kind = depth_m && traversability !== "TRAVERSABILITY_TRAVERSABLE" ? "wall" : TRAVERSABILITY[traversability] ?? "unknown";
+  return depth_m ? `${kind}, ${depth_m.toFixed(2)} m deep` : kind;
+}
 
 const endpoint = ({ x, y, z }) => ({ x_m: x, y_m: y, z_m: z });
 const ink = (name) => getComputedStyle(document.body).getPropertyValue(name);
@@ -66,9 +73,8 @@ export class Clicks {
     const levels = (columns?.[0]?.surfaces ?? []).slice().reverse();
     this.state.levels = levels;
     el("levels").replaceChildren(...levels.map((surface) => {
-      const what = surface.depth_m ? `wall, ${surface.depth_m.toFixed(2)} m deep` : TRAVERSABILITY[surface.traversability] ?? "unknown";
-      const label = surface.class_id ? `, class ${surface.class_id} (${surface.confidence ?? 0} %)` : "";
-      return node("li", `z ${metres(surface.z_m)} m ± ${(surface.sigma_m ?? 0).toFixed(3)}: ${what}${label}`);
+      const label = surface.class_id ? `, class ${classNameOf(this.view, surface.class_id)} (${surface.confidence ?? 0} %)` : "";
+      return node("li", `z ${metres(surface.z_m)} m ± ${(surface.sigma_m ?? 0).toFixed(3)}: ${whatOf(surface)}${label}`);
     }));
   }
   async showPath(from, to) {

@@ -1,7 +1,8 @@
 // By what surfaces are coloured: chosen by key or in the panel, in the map that is open.
+import { findClasses, showClasses } from "./classes.js";
 import { el, say } from "./dom.js";
-import { findFloors, forgetFloors } from "./floors.js";
-import { LAYERS, painterOf } from "./paint.js";
+import { chooseFloor, findFloors, forgetFloors } from "./floors.js";
+import { LAYERS, painterOf, scaleOf } from "./paint.js";
 import { shared } from "./patches.js";
 import { timesOf } from "./times.js";
 
@@ -14,7 +15,7 @@ export class Colours {
     el("floors").onclick = () => this.view && this.set(LAYERS.indexOf("floor"));
   }
   painter() {
-    return painterOf(LAYERS[this.index], this);
+    return painterOf(LAYERS[this.index], { ...this, classes: this.view?.classes ?? new Map() });
   }
   // Of a map that is being opened; before heights are known, too.
   setView(view) {
@@ -31,6 +32,23 @@ export class Colours {
     this.scans = scans;
     if (LAYERS[this.index] === "time") this.findTimes();
   }
+  // Of the tiles that are shown now.
+  showLegend() {
+    const layer = LAYERS[this.index];
+    [el("scale-low").textContent, el("scale-high").textContent] = scaleOf(layer, this);
+    if (layer === "class" && this.view) showClasses(this.view);
+  }
+  // As they are named now: somebody may be naming them.
+  async findClasses() {
+    try {
+      await findClasses(this.view);
+    } catch (error) {
+      if (error.name !== "AbortError") say(error.message);
+      return;
+    }
+    if (LAYERS[this.index] === "class") this.repaint();
+    this.showLegend();
+  }
   setDark(dark) {
     this.dark = dark;
     this.repaint();
@@ -42,7 +60,9 @@ export class Colours {
     document.body.dataset.layer = LAYERS[this.index];
     shared.greySides.value = Number(this.index === 0);
     this.repaint();
+    this.showLegend();
     if (!this.view) return;
+    if (LAYERS[this.index] === "class") await this.findClasses();
     if (LAYERS[this.index] === "time") this.findTimes();
     if (LAYERS[this.index] === "floor" && !this.view.codes.has("floor")) await this.findFloors();
   }
@@ -52,6 +72,11 @@ export class Colours {
   findTimes() {
     const timeOf = timesOf(this.scans);
     if (timeOf) this.view.setCodes("time", timeOf);
+  }
+  // One floor alone, by its place among them.
+  async showFloor(index) {
+    if (!this.view.codes.has("floor")) await this.findFloors();
+    chooseFloor(index);
   }
   async findFloors() {
     say("looking for floors …");

@@ -13,6 +13,19 @@ export function ageOf(created) {
   return days < 1 / 24 ? `${Math.max(1, Math.round(days * 1440))} min` : days < 1 ? `${Math.round(days * 24)} h` : `${Math.round(days)} d`;
 }
 
+// As people say it: three digits and a decimal unit.
+export function sizeOf(bytes) {
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  const unit = units.findIndex((_, i) => bytes < 999.5 * 1000 ** i || i + 1 === units.length);
+  const size = bytes / 1000 ** unit;
+  return `${size.toFixed(unit && size < 99.95 ? 1 : 0)} ${units[unit]}`;
+}
+
+// In UTC; empty where it is of no calendar: files without times have 0, and some clocks begin with the robot.
+export function dateOf(time) {
+  return new Date(time ?? "") >= Date.UTC(1971) ? new Date(time).toISOString().replace("T", " ").slice(0, 19) : "";
+}
+
 // A button that tells what goes wrong. `label`: for those who do not see what is around it.
 export function button(text, label, act) {
   const made = document.createElement("button");

@@ -60,6 +60,13 @@ export async function findFloors(view, stage) {
   return floors.length;
 }
 
+// One of the floors that were found alone, by its place among them.
+export function chooseFloor(index) {
+  const choice = el("floor");
+  choice.value = index;
+  choice.dispatchEvent(new Event("change"));
+}
+
 export function forgetFloors(stage) {
   el("floor-choice").hidden = true;
   el("floor-legend").replaceChildren();

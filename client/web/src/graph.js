@@ -1,4 +1,5 @@
 // The pose graph: trajectories, scans, and what holds them in their places, by who says so.
+import { dateOf } from "./dom.js";
 import { stream } from "./rpc.js";
 
 const RUNS = ["#0b3c75", "#e69f00", "#00664a", "#b0447f", "#d55e00", "#7a6a00"];
@@ -58,7 +59,7 @@ export async function drawGraph(view, stage, switches, hover) {
   const counts = { scans: nodes.length };
   hover.set("scans", nodes.map(({ id, time, state }) => {
     const [x, y, z] = places.get(keyOf(id));
-    const when = time ? `, ${time.replace("T", " ").slice(0, 19)} UTC` : "";
+    const when = dateOf(time) ? `, ${dateOf(time)} UTC` : "";
     const how = (state ?? "").replace("SCAN_STATE_", "").toLowerCase();
     return { x, y, z, text: `scan ${keyOf(id)}${when}${how && how !== "integrated" ? `, ${how}` : ""}` };
   }));

@@ -6,7 +6,7 @@ import { listEpochs } from "./epochs.js";
 import { drawGraph } from "./graph.js";
 import { Hover } from "./hover.js";
 import { Jobs } from "./jobs.js";
-import { listMaps } from "./map_list.js";
+import { countMaps, listMaps } from "./map_list.js";
 import { MapView } from "./map_view.js";
 import { drawModels } from "./models.js";
 import { LAYERS } from "./paint.js";
@@ -33,12 +33,20 @@ const jobs = new Jobs(() => layersSoon());
 function showState({ scans, epoch, inferred } = {}) {
   if (!view) return;
   if (scans || epoch || inferred) layersSoon();
+  colours.showLegend();
   const levels = [...new Set(view.shown().map(({ decoded }) => decoded.level))].sort((a, b) => a - b);
   const detail = levels.length > 1 || levels[0] ? `, levels of detail ${levels.join(" ")}` : "";
   el("state").textContent = `${view.shown().length} tiles, ${view.surfaces().toLocaleString("en")} surfaces, epoch ${view.epoch ?? "0"}${detail}`;
 }
 
-async function openMap(name, camera) {
+// The camera of a link; null without one.
+function cameraOf(link) {
+  const camera = (link.get("cam") ?? "").split(",").map(Number);
+  return camera.length === 6 && camera.every(Number.isFinite) ? camera : null;
+}
+
+// `link`: what it says of the view is shown; of a map chosen in the list nothing.
+async function openMap(name, link = new URLSearchParams()) {
   view?.close();
   state.ready = false;
   clicks.clear();
@@ -49,9 +57,12 @@ async function openMap(name, camera) {
   say(`opening ${name} …`);
   el("name").textContent = name;
   await view.open();
+  if (link.get("map") !== name) history.replaceState(null, "", `#${new URLSearchParams({ map: name })}`);
+  if (link.has("show")) switches.on = new Set(link.get("show").split(","));
+  const camera = cameraOf(link);
   const { low, high } = view.box();
   Object.assign(el("cut"), { min: low[2] - 0.5, max: high[2] + 1, value: high[2] + 1 });
-  setCut(hash.has("cut") && camera ? Number(hash.get("cut")) : null);
+  setCut(link.has("cut") && camera ? Number(link.get("cut")) : null);
   if (camera) stage.look(camera);
   else fit();
   view.look();
@@ -61,6 +72,7 @@ async function openMap(name, camera) {
   jobs.open(view);
   layersSoon(0);
   await colours.setHeights(low[2], high[2]);
+  if (link.has("floor")) await colours.showFloor(link.get("floor"));
 }
 
 // What lies over the surfaces, once for several changes.
@@ -75,6 +87,7 @@ function layersSoon(ms = 1000) {
 
 async function drawLayers(of) {
   jobs.setCurrent(await listEpochs(of, stage, jobs));
+  await colours.findClasses();
   const graph = await drawGraph(of, stage, switches, hover);
   state.runs = graph.runs;
   colours.setScans(graph.scans);
@@ -88,19 +101,25 @@ function fit() {
   stage.look([middle[0], middle[1] - 0.7 * reach, middle[2] + 0.6 * reach, ...middle]);
 }
 
-// null: nothing is cut off.
+// Where the slider cuts off; 1e9 at its last stop, nowhere.
+function cutOf(slider) {
+  return Number(slider.value) > Number(slider.max) - Number(slider.step) ? 1e9 : Number(slider.value);
+}
+
+// null: where the slider is.
 function setCut(height) {
   const slider = el("cut");
   if (height !== null) slider.value = height;
-  const all = Number(slider.value) > Number(slider.max) - Number(slider.step); // its last stop
-  shared.cut.value = all ? 1e9 : Number(slider.value);
-  el("cut-value").textContent = all ? "nothing" : `${Number(slider.value).toFixed(2)} m`;
+  shared.cut.value = cutOf(slider);
+  el("cut-value").textContent = shared.cut.value === 1e9 ? "nothing" : `${shared.cut.value.toFixed(2)} m`;
   stage.redraw();
 }
 
 function linkToView() {
-  const link = new URLSearchParams({ map: view.name, cam: stage.view().map((v) => v.toFixed(2)).join(","), layer: el("layer").value });
-  if (shared.cut.value < 1e9) link.set("cut", shared.cut.value.toFixed(2));
+  const link = new URLSearchParams({ map: view.name, cam: stage.view().map((v) => v.toFixed(2)).join(","), layer: el("layer").value, show: [...switches.on].join() });
+  const cut = cutOf(el("cut"));
+  if (cut < 1e9) link.set("cut", cut.toFixed(2));
+  if (!el("floor-choice").hidden && el("floor").value) link.set("floor", el("floor").value);
   history.replaceState(null, "", `#${link}`);
   navigator.clipboard?.writeText(location.href).catch(() => {});
   say("the address shows this view now, and is copied");
@@ -191,17 +210,18 @@ function wirePanel() {
 
 // Also after a new token: a map that is open stays, and follows again by itself.
 async function begin() {
+  let maps = [];
   try {
-    const maps = await listMaps(openMap);
+    maps = await listMaps(openMap);
     el("token-form").hidden = true;
     const name = hash.get("map") ?? (maps.length === 1 ? maps[0].name : null);
-    const camera = hash.get("cam")?.split(",").map(Number);
     if (view && state.ready) clicks.prompt();
-    else if (name) await openMap(name, camera?.length === 6 && camera.every(Number.isFinite) ? camera : null);
+    else if (name) await openMap(name, hash);
     else if (maps.length) say("choose a map");
   } catch (error) {
     say(error.message);
   }
+  countMaps(maps); // after the map asked for: it may be the only one that the server opens
   state.begun = true;
 }
 

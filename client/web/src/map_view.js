@@ -30,6 +30,7 @@ export class MapView {
     this.low = Infinity;
     this.high = -Infinity;
     this.codes = new Map();
+    this.classes = new Map(); // {name, colour} by id
   }
   // Returns when the map is there coarsely; look() then makes it finer.
   async open() {

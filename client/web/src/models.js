@@ -1,5 +1,6 @@
 // What jobs made of the map: planes, objects, and what nobody saw of objects (hatched).
 import * as THREE from "three";
+import { classNameOf } from "./classes.js";
 import { metres } from "./dom.js";
 import { stream } from "./rpc.js";
 
@@ -66,9 +67,9 @@ export function edgesOf({ centre = {}, size = {}, yaw_rad: yaw = 0 }) {
   return edges;
 }
 
-function describe({ id, class_id, kind, box = {}, points }) {
+function describe({ id, class_id, kind, box = {}, points }, view) {
   const { x, y, z } = box.size ?? {};
-  return `object ${id}, class ${class_id}${kind?.name ? `, ${kind.name}` : ""}: ${metres(x)} × ${metres(y)} × ${metres(z)} m, ${points} points`;
+  return `object ${id}, class ${classNameOf(view, class_id)}${kind?.name ? `, ${kind.name}` : ""}: ${metres(x)} × ${metres(y)} × ${metres(z)} m, ${points} points`;
 }
 
 // Squares of the dots that every third diagonal line leaves out, so that nobody takes them for measured.
@@ -98,7 +99,7 @@ export async function drawModels(view, stage, switches, hover) {
   const entities = await partsOf("Objects/ListEntities", "entity", view);
   switches.offer("objects", entities.length, OBJECT, (on) => {
     stage.remove("objects");
-    hover.set("objects", on ? entities.map((one) => ({ x: 0, y: 0, z: 0, ...one.box?.centre, text: describe(one) })) : []);
+    hover.set("objects", on ? entities.map((one) => ({ x: 0, y: 0, z: 0, ...one.box?.centre, text: describe(one, view) })) : []);
     if (on) stage.segments("objects", entities.flatMap(({ box = {} }) => edgesOf(box)), OBJECT);
   });
   const inferred = await partsOf("Objects/ListInferred", "inferred", view);

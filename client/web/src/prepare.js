@@ -18,7 +18,7 @@ function rowsOf(tile, vertical, count) {
   return { rows, count };
 }
 
-// Of a decoded tile; low and high are those of its surfaces [m].
+// Of a decoded tile; low and high are those of its surfaces [m], classes all that they have.
 export function prepare(tile) {
   const { level, x, y, size } = tile;
   let low = Infinity;
@@ -30,5 +30,6 @@ export function prepare(tile) {
     low = Math.min(low, tile.height[i] - (wall ? tile.depth[i] : 0));
     high = Math.max(high, tile.height[i]);
   }
-  return { level, x, y, size, low: low / 512, high: high / 512, flat: rowsOf(tile, 0, size - walls), walls: rowsOf(tile, 1, walls) };
+  const classes = [...new Set(tile.classId.subarray(0, size))];
+  return { level, x, y, size, classes, low: low / 512, high: high / 512, flat: rowsOf(tile, 0, size - walls), walls: rowsOf(tile, 1, walls) };
 }

@@ -1,11 +1,9 @@
 // When a surface was seen, as far as the pose graph tells: the time of the scan taken nearest to it.
-import { el } from "./dom.js";
+import { dateOf, el } from "./dom.js";
 
 const MOST_SCANS = 4096; // looked through; of more every second, third …
 const BLOCK = 1; // in which the nearest scan is the same [m]
 const CODES = 254; // from 1; 0: not known
-
-const shortOf = (ms) => new Date(ms).toISOString().replace("T", " ").slice(0, 19);
 
 // Number of the scan nearest to a place, the same for a block.
 function nearestOf(scans) {
@@ -27,13 +25,13 @@ function nearestOf(scans) {
 }
 
 // Function of a place to its code, from the oldest scan's 1 to the youngest's 255, and says both in
-// the legend. `scans`: {x, y, z, time}. Null where none has a time.
+// the legend. `scans`: {x, y, z, time}. Null where none has one with a date.
 export function timesOf(scans) {
-  const timed = scans.map((scan) => ({ ...scan, ms: Date.parse(scan.time ?? "") })).filter(({ ms }) => ms > 0);
+  const timed = scans.filter(({ time }) => dateOf(time)).map((scan) => ({ ...scan, ms: Date.parse(scan.time) }));
   const all = timed.map(({ ms }) => ms);
   const [first, last] = [all.reduce((a, b) => Math.min(a, b), Infinity), all.reduce((a, b) => Math.max(a, b), -Infinity)];
-  el("time-first").textContent = timed.length ? `${shortOf(first)} UTC` : "no scan has a time";
-  el("time-last").textContent = timed.length ? shortOf(last) : "";
+  el("time-first").textContent = timed.length ? `${dateOf(first)} UTC` : "no scan has a date";
+  el("time-last").textContent = timed.length ? dateOf(last) : "";
   if (!timed.length) return null;
   const every = Math.ceil(timed.length / MOST_SCANS);
   const few = timed.filter((_, i) => i % every === 0);

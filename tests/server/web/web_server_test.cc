@@ -323,6 +323,35 @@ TEST_F(WebServerTest, TheViewerIsAFixedTableOfFiles) {
   EXPECT_THAT(Server::Start(db_, options), StatusIs(Code::kNotFound, HasSubstr("icon.svg")));
 }
 
+TEST_F(WebServerTest, TheViewerComesPackedToWhoTakesIt) {
+  for (const char* file :
+       {"index.html", "viewer.js", "viewer.js.gz", "worker.js", "viewer.css", "icon.svg"}) {
+    std::ofstream(dir_.path() / file) << file;
+  }
+  ServerOptions options;
+  options.web_viewer = dir_.path();
+  ServeWeb(options);
+  for (const char* takes : {"gzip", "gzip, deflate, br, zstd", "br;q=1.0, GZIP;q=0.5, *;q=0"}) {
+    const HttpAnswer script = Get("/viewer.js", {{"Accept-Encoding", takes}});
+    EXPECT_EQ(script.body, "viewer.js.gz") << takes;
+    EXPECT_EQ(script.headers.at("content-encoding"), "gzip") << takes;
+    EXPECT_EQ(script.headers.at("content-type"), "text/javascript");
+    EXPECT_EQ(script.headers.at("vary"), "Accept-Encoding");
+  }
+  for (const char* takes : {"identity", "br", "gzip;q=0", "gzip; q=0.000", "gzip;q=x", "xgzip"}) {
+    const HttpAnswer script = Get("/viewer.js", {{"Accept-Encoding", takes}});
+    EXPECT_EQ(script.body, "viewer.js") << takes;
+    EXPECT_EQ(script.headers.count("content-encoding"), 0) << takes;
+    EXPECT_EQ(script.headers.at("vary"), "Accept-Encoding");
+  }
+  EXPECT_EQ(Get("/viewer.css", {{"Accept-Encoding", "gzip"}}).body, "viewer.css");
+  // Each has an ETag of its own.
+  const Headers gzip = {{"Accept-Encoding", "gzip"}};
+  const std::string etag = Get("/viewer.js", gzip).headers.at("etag");
+  EXPECT_EQ(Get("/viewer.js", {gzip[0], {"If-None-Match", etag}}).status, 304);
+  EXPECT_EQ(Get("/viewer.js", {{"If-None-Match", etag}}).status, 200);
+}
+
 TEST_F(WebServerTest, PagesOfOthersReachNothing) {
   ServerOptions options;
   options.web_names = {"maps.example"};
