@@ -29,6 +29,7 @@
 #include "core/registration/place_descriptor.h"
 #include "core/registration/place_index.h"
 #include "core/registration/place_match.h"
+#include "core/registration/upright_frame.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/pcd.h"
 #include "tests/support/simulator/simulator.h"
@@ -253,9 +254,11 @@ void PrintLocalisationTable(const Places& places, const Settings& settings) {
     for (const auto& near : index.Nearest(places.descriptors[j], 5, excluded)) {
       const std::vector<SeenScan> target =
           TargetOf(places, places.reference, Pose::Identity(), near.number, settings.beside);
-      matches.push_back(MatchPlace({&places.features[j]},
+      matches.push_back(MatchPlace({.features = &places.features[j]},
                                    target,
-                                   HypothesesOf(near.similarity, places.reference[near.number])));
+                                   HypothesesOf(near.similarity,
+                                                UprightTurn(places.features[near.number].up()),
+                                                UprightTurn(places.features[j].up()))));
       if (settings.verbose) {
         PrintMatch("at", near.number, j, matches.back(), places.reference[j]);
       }

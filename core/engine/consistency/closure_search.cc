@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <optional>
+#include <ranges>
 #include <set>
 #include <utility>
 
@@ -10,6 +12,7 @@
 #include "absl/strings/str_format.h"
 
 #include "core/common/status.h"
+#include "core/engine/consistency/contradicted_joins.h"
 #include "core/engine/map/parallel.h"
 #include "core/engine/scans/matching.h"
 #include "core/posegraph/closures/closure_candidates.h"
@@ -63,6 +66,7 @@ class Searcher {
     for (int pass = 0; pass < kMaxFinePasses; ++pass, ++pass_) {
       STRATA_RETURN_IF_ERROR(Close().status());
     }
+    STRATA_RETURN_IF_ERROR(TakeBackContradicted());
     search_.matched = matched_.size();
     return std::move(search_);
   }
@@ -195,6 +199,7 @@ class Searcher {
     found.T_i_j = Normalized(match.T_target_source);
     found.information =
         LoosenedInformation(match.information, IsotropicInformation(kMatchSigmaRad, kMatchSigmaM));
+    found.confidence = match.confidence;
     found.note =
         absl::StrFormat("%s, overlap %.2f, confidence %.2f",
                         candidate.reason == ClosureReason::kNear ? "near by the graph" : "alike",
@@ -240,6 +245,17 @@ class Searcher {
     search_.closures.clear();
     for (const std::size_t k : consistent.kept) search_.closures.push_back(matched_[k]);
     return absl::OkStatus();
+  }
+
+  absl::Status TakeBackContradicted() {
+    STRATA_ASSIGN_OR_RETURN(
+        const std::vector<std::size_t> contradicted,
+        ContradictedJoins(world_, views_, measured_.edges, search_.closures, search_.T_map_scan));
+    if (contradicted.empty()) return absl::OkStatus();
+    for (const std::size_t k : std::views::reverse(contradicted)) {
+      search_.closures.erase(search_.closures.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    return CloseLoops();
   }
 
   absl::Status CloseLoops() {

@@ -20,7 +20,8 @@ struct FoundClosure {
   std::size_t i = 0, j = 0;  // nodes
   Pose T_i_j = Pose::Identity();
   Matrix6d information = Matrix6d::Identity();
-  std::string note;  // how it was found, for people
+  double confidence = 0.0;  // PlaceMatch::confidence
+  std::string note;         // how it was found, for people
 };
 
 struct ClosureSearch {

@@ -15,7 +15,7 @@
 
 #include "core/common/disjoint_sets.h"
 #include "core/common/status.h"
-#include "core/registration/place_match.h"
+#include "core/engine/consistency/contradicted_joins.h"
 
 namespace strata {
 namespace {
@@ -88,18 +88,6 @@ std::set<NodePair> PairsToCompare(const GraphWorld& world, const AlignmentResult
     if (other.has_value()) add(*other, node);
   }
   return pairs;
-}
-
-absl::StatusOr<double> ContradictionAt(ScanViews& views,
-                                       const std::vector<Pose>& T_map_scan,
-                                       const NodePair& pair) {
-  STRATA_ASSIGN_OR_RETURN(const auto first, views.Features(pair.first));
-  STRATA_ASSIGN_OR_RETURN(const auto second, views.Features(pair.second));
-  const auto origin = [&](std::size_t node) {
-    return Eigen::Vector3d(views.scan(node).header.sensor_origin.cast<double>());
-  };
-  return ContradictionOf({first.get(), T_map_scan[pair.first], origin(pair.first)},
-                         {second.get(), T_map_scan[pair.second], origin(pair.second)});
 }
 
 bool IsTooMany(std::size_t doubtful,
