@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <ranges>
 #include <set>
 #include <utility>
 
@@ -252,9 +251,12 @@ class Searcher {
         const std::vector<std::size_t> contradicted,
         ContradictedJoins(world_, views_, measured_.edges, search_.closures, search_.T_map_scan));
     if (contradicted.empty()) return absl::OkStatus();
-    for (const std::size_t k : std::views::reverse(contradicted)) {
-      search_.closures.erase(search_.closures.begin() + static_cast<std::ptrdiff_t>(k));
+    std::vector<FoundClosure> left;
+    for (std::size_t k = 0; k < search_.closures.size(); ++k) {
+      if (std::ranges::binary_search(contradicted, k)) continue;
+      left.push_back(std::move(search_.closures[k]));
     }
+    search_.closures = std::move(left);
     return CloseLoops();
   }
 

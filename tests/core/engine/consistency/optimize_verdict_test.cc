@@ -66,7 +66,7 @@ TEST_F(OptimizeVerdictTest, WhatDoesNotSettleAroundALooseStepIsProposed) {
   WaitIntegrated(db());
   const JobInfo job = Optimize({{"rounds", "1"}});
   EXPECT_EQ(job.state, JobState::kProposed) << job.message;
-  EXPECT_THAT(job.message, HasSubstr("not settled after 1 rounds"));
+  EXPECT_THAT(job.message, HasSubstr("not settled after 1 round. "));
   EXPECT_THAT(job.message, HasSubstr("1 of 5 steps from scan to scan are the robot's word alone"));
   EXPECT_THAT(job.message, HasSubstr("Too little to be applied by itself"));
 }
