@@ -116,12 +116,14 @@ absl::Status SqliteBagReader::Visit(Visitor visit) {
     last_row_ = sqlite3_column_int64(last.get(), 0);
   }
   // Damage hides rows, nobody knows how many: what comes behind them is looked for row by row.
+  row_ = 0;  // not of the visit before
   std::int64_t after = std::numeric_limits<std::int64_t>::min();
   for (int missing = 0; missing <= kMostMissingRows;) {
     STRATA_ASSIGN_OR_RETURN(const bool is_end, VisitAfter(after, visit));
     if (is_end) return absl::OkStatus();
-    if (missing == 0 || row_ > after)
+    if (missing == 0 || row_ > after) {
       AddDamage(absl::StrCat("after message ", row_, ": ", Fault()));
+    }
     missing = row_ > after ? 1 : missing + 1;
     after = std::max(row_, after);
     if (after == std::numeric_limits<std::int64_t>::max()) break;

@@ -189,6 +189,31 @@ TEST_F(BagReadersTest, OfADamagedSqliteFileAllOtherMessagesAreRead) {
               StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("sqlite3 FILE .recover")));
 }
 
+// An import reads twice; damage may hide the first messages.
+TEST_F(BagReadersTest, ADamagedSqliteFileGivesTheSameTwice) {
+  const std::vector<BagEntry> entries = DrawEntries(12, "std_msgs/msg/String");
+  ASSERT_TRUE(testing::WriteDb3(dir_.path() / "a.db3", entries));
+  STRATA_ASSERT_OK_AND_ASSIGN(const std::string file, ReadFileBytes(dir_.path() / "a.db3"));
+  constexpr std::ptrdiff_t kPage = 4096;
+  int without_the_first = 0;
+  for (std::ptrdiff_t page = 3; page < 12; ++page) {
+    std::string holed = file;
+    std::fill_n(holed.begin() + page * kPage, kPage, '\x5a');
+    const auto reader = OpenBagFile(Write("holed.db3", holed));
+    if (!reader.ok()) continue;
+    std::vector<std::vector<std::int64_t>> times(2);
+    for (std::vector<std::int64_t>& visit : times) {
+      STRATA_ASSERT_OK((*reader)->Visit([&visit](const BagMessage& message) {
+        visit.push_back(message.time_ns);
+        return absl::OkStatus();
+      }));
+    }
+    EXPECT_EQ(times[0], times[1]) << page;
+    without_the_first += !times[0].empty() && times[0][0] != entries[0].time_ns ? 1 : 0;
+  }
+  EXPECT_GT(without_the_first, 0);
+}
+
 TEST_F(BagReadersTest, AChunkWithAnotherChecksumIsLeftOutAndTheOthersAreRead) {
   const std::vector<BagEntry> entries = DrawEntries(6, "std_msgs/msg/String");
   std::string file = testing::McapBytes(entries, {.chunk_bytes = 30'000});
