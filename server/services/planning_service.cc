@@ -77,6 +77,7 @@ absl::Status Explore(api::Database& db,
                      const v1::ExploreRequest& in,
                      v1::ExploreResponse& out) {
   STRATA_ASSIGN_OR_RETURN(const ExploreQuery query, AtTheDoor(FromProto(in)));
+  STRATA_RETURN_IF_ERROR(AtTheDoor(CheckGiven(in.has_from(), "from")));
   STRATA_ASSIGN_OR_RETURN(const ExploreResult result, db.planning().Explore(call, in.map(), query));
   out = ToProto(result);
   return absl::OkStatus();

@@ -165,6 +165,10 @@ TEST_F(ServerTest, WhatIsWrongInItselfNeverReachesTheDatabase) {
   EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::PlanPath, plan, &planned),
               StatusIs(Code::kInvalidArgument, HasSubstr("to is missing")));
 
+  v1::ExploreResponse explored;
+  EXPECT_THAT(Call<v1::Planning>(&v1::Planning::Stub::Explore, v1::ExploreRequest(), &explored),
+              StatusIs(Code::kInvalidArgument, HasSubstr("from is missing")));
+
   v1::GetTileRequest tile;
   v1::GetTileResponse got;
   tile.mutable_key()->set_level(-1);

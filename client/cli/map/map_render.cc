@@ -15,6 +15,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_split.h"
 
 #include "client/cli/map/floor_files.h"
@@ -195,17 +196,20 @@ std::string IsNoOtherPicture(const std::string& file) {
 }
 
 void AddViewOptions(CLI::App* render, const std::shared_ptr<RenderOptions>& options) {
+  const auto in_degrees = [](double angle_rad) {
+    return absl::StrFormat("%.0f", angle_rad * 180.0 / std::numbers::pi);
+  };
   render->add_option("--view", options->view, "top, or oblique from above and aside")
       ->check(CLI::IsMember({"top", "oblique"}))
       ->capture_default_str();
   TakesAngle(render->add_option(
                  "--azimuth", options->azimuth_rad, "Where an oblique view looks from [degrees]"))
-      ->default_str("-57");
+      ->default_str(in_degrees(options->azimuth_rad));
   TakesAngle(render->add_option("--elevation",
                                 options->elevation_rad,
                                 "Its angle above the ground [degrees], 3 to 90"))
       ->check(CLI::Range(0.05, 1.5708))
-      ->default_str("34");
+      ->default_str(in_degrees(options->elevation_rad));
   render
       ->add_option_function<std::string>(
           "--size",
