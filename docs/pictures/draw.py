@@ -132,6 +132,13 @@ class Maps:
         for profile in ("default", "wheelchair"):
             self.strata("map", "render", "yard", HERE / f"floor-{profile}.png", "--profile", profile, "--at", "0,0,3.4", "--size", "560x300")
 
+    def nodding(self):
+        bag, urdf = self.folder / "nodding.bag", self.folder / "robot.urdf"
+        subprocess.run([HERE.parent.parent / "tests/support/write_laser_bag.py", bag, urdf], check=True, stdout=subprocess.DEVNULL)
+        self.strata("map", "create", "room")
+        self.strata("scan", "import", "room", bag, "--urdf", urdf, "--sweep", 2, "--wait")
+        self.strata("map", "render", "room", HERE / "nodding.png", "--view", "oblique", "--size", "460x320")
+
     def tell(self, program, *words):
         return subprocess.run([self.build / program, *map(str, words)], check=True, stdout=subprocess.PIPE, text=True).stdout
 
@@ -163,6 +170,7 @@ def main():
         maps.add("flat", maps.simulate("flat", "rooms", "--seed", 4, "--step", 2))
         maps.floorplan("flat", 0, HERE / "floorplan.png")
         maps.tour()
+        maps.nodding()
         maps.explore("half", maps.simulate("half", "rooms", "--seed", 4, "--step", 2), (1, -1, 0), HERE / "explore.png")
     subprocess.run([sys.executable, HERE.parent.parent / "tests/experiments/underpass.py", "--build", build, "--seeds", "1",
                     "--picture", HERE / "underpass.png"], check=True)

@@ -52,8 +52,12 @@ void TryDatabase(const std::string& bytes) {
 }
 
 void TryMessage(FuzzedDataProvider& input) {
-  constexpr std::array kTypes = {
-      kPointCloudType, "nav_msgs/Odometry", "geometry_msgs/PoseStamped", "tf2_msgs/TFMessage"};
+  constexpr std::array kTypes = {kPointCloudType,
+                                 kLaserScanType,
+                                 kJointStateType,
+                                 "nav_msgs/Odometry",
+                                 "geometry_msgs/PoseStamped",
+                                 "tf2_msgs/TFMessage"};
   const BagTopic topic = {"/t",
                           input.PickValueInArray(kTypes),
                           input.ConsumeBool() ? MessageEncoding::kCdr : MessageEncoding::kRos1};
@@ -61,6 +65,12 @@ void TryMessage(FuzzedDataProvider& input) {
   if (topic.type == kPointCloudType) {
     RequireGoodRefusal(ReadRosCloudHead(bytes, topic.encoding).status());
     TryCloud(ReadRosCloud(bytes, topic.encoding));
+  } else if (topic.type == kLaserScanType) {
+    const auto scan = ReadRosLaserScan(bytes, topic.encoding);
+    RequireGoodRefusal(scan.status());
+    if (scan.ok()) TryCloud(scan->line);
+  } else if (topic.type == kJointStateType) {
+    RequireGoodRefusal(ReadRosJointState(bytes, topic.encoding).status());
   } else {
     RequireGoodRefusal(ReadRosPoses(topic, bytes).status());
   }

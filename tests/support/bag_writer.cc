@@ -231,6 +231,37 @@ std::string CloudMessage(Layout layout,
   return writer.Put(std::uint8_t{1}).bytes();
 }
 
+std::string LaserMessage(Layout layout,
+                         std::int64_t stamp_ns,
+                         absl::string_view frame,
+                         float first_rad,
+                         float step_rad,
+                         float step_s,
+                         const std::vector<float>& ranges_m) {
+  MessageWriter message(layout);
+  const auto count = static_cast<std::uint32_t>(ranges_m.size());
+  const float last_rad = first_rad + step_rad * static_cast<float>(count - 1);
+  message.Header(stamp_ns, frame);
+  for (const float number : {first_rad, last_rad, step_rad, step_s, 0.0F, 0.1F, 30.0F}) {
+    message.Put(number);
+  }
+  message.Put(count);
+  for (const float range_m : ranges_m) message.Put(range_m);
+  return message.Put(std::uint32_t{0}).bytes();
+}
+
+std::string JointMessage(Layout layout,
+                         std::int64_t stamp_ns,
+                         const std::map<std::string, double>& positions) {
+  MessageWriter message(layout);
+  const auto count = static_cast<std::uint32_t>(positions.size());
+  message.Header(stamp_ns, "").Put(count);
+  for (const auto& [name, position] : positions) message.Text(name);
+  message.Put(count);
+  for (const auto& [name, position] : positions) message.Put(position);
+  return message.Put(std::uint32_t{0}).Put(std::uint32_t{0}).bytes();
+}
+
 std::string OdometryMessage(Layout layout,
                             std::int64_t stamp_ns,
                             absl::string_view frame,

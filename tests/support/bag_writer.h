@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,17 @@ std::string CloudMessage(Layout layout,
                          const std::vector<Eigen::Vector4f>& points,
                          std::uint32_t rows = 1,
                          const std::vector<std::uint32_t>& t_ns = {});
+// A laser's line from `first_rad` on; no intensities.
+std::string LaserMessage(Layout layout,
+                         std::int64_t stamp_ns,
+                         absl::string_view frame,
+                         float first_rad,
+                         float step_rad,
+                         float step_s,
+                         const std::vector<float>& ranges_m);
+std::string JointMessage(Layout layout,
+                         std::int64_t stamp_ns,
+                         const std::map<std::string, double>& positions);
 std::string OdometryMessage(Layout layout,
                             std::int64_t stamp_ns,
                             absl::string_view frame,

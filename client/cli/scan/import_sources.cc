@@ -45,11 +45,13 @@ absl::Status CheckOptionsFor(bool recording, const ImportOptions& options) {
       {"--poses-from", !options.poses_from.empty()},
       {"--every", !options.every.empty()},
       {"--mount", options.mount.has_value()},
+      {"--urdf", !options.urdf.empty()},
+      {"--sweep", options.sweep_s.has_value()},
       {"--format", options.format != "auto"},
       {"--poses", !options.poses.empty()},
       {"--pose-format", options.pose_format != "auto"},
   };
-  constexpr std::size_t kOfRecordings = 4;  // the first ones
+  constexpr std::size_t kOfRecordings = 6;  // the first ones
   for (std::size_t i = 0; i < std::size(given); ++i) {
     const auto& [name, is_given] = given[i];
     if (!is_given || recording == (i < kOfRecordings)) continue;
@@ -75,6 +77,8 @@ absl::StatusOr<std::vector<ScanFile>> FindRecordedScans(const ImportOptions& opt
   STRATA_ASSIGN_OR_RETURN(
       bag.every, ParseKeyframeSpacing(options.every.empty() ? kDefaultEvery : options.every));
   bag.T_base_cloud = options.mount;
+  bag.urdf = options.urdf;
+  bag.sweep_s = options.sweep_s;
   bag.tell = [&output, &progress](const std::string& text) {
     progress.Clear();
     output.Talk(text);

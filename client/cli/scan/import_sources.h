@@ -48,6 +48,8 @@ struct ImportOptions {
   std::string poses_from;
   std::string every;
   std::optional<Pose> mount;
+  std::string urdf;
+  std::optional<double> sweep_s;
 };
 
 // The spacing of keyframes that `every` stands for, and without one.

@@ -17,6 +17,7 @@
 #include "client/cli/scan/spool_commands.h"
 #include "client/cli/terminal/arguments.h"
 #include "client/cli/terminal/json.h"
+#include "client/formats/bags/bag_scans.h"
 #include "core/common/status.h"
 
 namespace strata::cli {
@@ -85,8 +86,8 @@ void AddRecordingOptions(CLI::App* import, const std::shared_ptr<ImportOptions>&
       ->add_option(
           "--topic",
           options->topic,
-          "Of a recording: the topic of sensor_msgs/PointCloud2; not needed where there is "
-          "one only. 'strata scan topics' lists them")
+          "Of a recording: the topic of sensor_msgs/PointCloud2, or of sensor_msgs/LaserScan; not "
+          "needed where there is one only. 'strata scan topics' lists them")
       ->type_name("TOPIC");
   import
       ->add_option(
@@ -112,6 +113,21 @@ void AddRecordingOptions(CLI::App* import, const std::shared_ptr<ImportOptions>&
       [options](const Pose& pose, std::size_t) { options->mount = pose; },
       "Of a recording without the transforms: where the sensor is on what the poses are those of "
       "[m, degrees]");
+  import
+      ->add_option("--urdf",
+                   options->urdf,
+                   "Of a recording without the transforms: the robot's description, whose joints "
+                   "move as sensor_msgs/JointState says")
+      ->type_name("FILE");
+  import
+      ->add_option("--sweep",
+                   options->sweep_s,
+                   absl::StrCat("Of a laser (sensor_msgs/LaserScan) that a joint turns or tilts: "
+                                "the lines of so many seconds are a scan [",
+                                kDefaultSweepS,
+                                "]"))
+      ->check(CLI::Range(0.01, 600.0))
+      ->type_name("SECONDS");
 }
 
 }  // namespace

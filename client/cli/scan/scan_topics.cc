@@ -19,7 +19,8 @@ namespace {
 
 // What `scan import` takes a topic for.
 std::string UseOf(const RecordedTopic& topic) {
-  if (topic.topic.type == kPointCloudType) return "--topic";
+  if (topic.topic.type == kPointCloudType || topic.topic.type == kLaserScanType) return "--topic";
+  if (topic.topic.type == kJointStateType) return "--urdf";
   if (IsPoseType(topic.topic.type)) return "--poses-from";
   return IsTransformsType(topic.topic.type) ? "transforms" : "-";
 }

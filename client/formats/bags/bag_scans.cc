@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,8 @@
 #include "absl/strings/string_view.h"
 
 #include "client/formats/bags/cloud_poses.h"
+#include "client/formats/bags/joint_transforms.h"
+#include "client/formats/bags/laser_sweeps.h"
 #include "client/formats/bags/recording.h"
 #include "client/formats/bags/ros_messages.h"
 #include "core/common/status.h"
@@ -53,6 +56,8 @@ std::string Offered(const RecordingSurvey& survey, absl::string_view option, Top
 }
 
 bool HasClouds(const RecordedTopic& topic) { return topic.topic.type == kPointCloudType; }
+bool HasLines(const RecordedTopic& topic) { return topic.topic.type == kLaserScanType; }
+bool HasPoints(const RecordedTopic& topic) { return HasClouds(topic) || HasLines(topic); }
 bool HasPoses(const RecordedTopic& topic) { return IsPoseType(topic.topic.type); }
 
 // The topic that is named, or else the only one that fits; null if there is none or several.
@@ -68,11 +73,16 @@ RecordedTopic* FindTopic(RecordingSurvey& survey, const std::string& name, Topic
 }
 
 absl::StatusOr<RecordedTopic*> CloudTopic(RecordingSurvey& survey, const std::string& name) {
-  RecordedTopic* const topic = FindTopic(survey, name, &HasClouds);
-  const std::string offers = Offered(survey, "--topic", &HasClouds);
+  // Who has clouds seldom means the laser at the bumper.
+  const bool clouds = name.empty() && std::ranges::any_of(survey.topics, &HasClouds);
+  const TopicFilter fits = clouds ? &HasClouds : &HasPoints;
+  RecordedTopic* const topic = FindTopic(survey, name, fits);
+  const std::string offers = Offered(survey, "--topic", fits);
   if (topic == nullptr) {
     return absl::InvalidArgumentError(
-        offers.empty() ? absl::StrCat("no topic of type ", kPointCloudType, "; ", kAllTopics)
+        offers.empty()
+            ? absl::StrCat(
+                  "no topic of type ", kPointCloudType, " or ", kLaserScanType, "; ", kAllTopics)
         : name.empty() ? absl::StrCat("which clouds? Say ", offers)
                        : absl::StrCat("no topic ", name, " has clouds; say ", offers));
   }
@@ -146,15 +156,21 @@ class CloudPoses {
 
   absl::StatusOr<CloudPose> At(const std::string& frame, std::int64_t stamp_ns) {
     const std::lock_guard lock(mutex_);
-    STRATA_ASSIGN_OR_RETURN(
-        const Pose T_map_base,
-        source_.topic != nullptr
-            ? source_.topic->poses.At(stamp_ns)
-            : transforms_.Lookup(source_.frames.fixed, source_.frames.base, stamp_ns));
+    STRATA_ASSIGN_OR_RETURN(const Pose T_map_base, BaseAtLocked(stamp_ns));
     return PoseOfCloud(T_map_base, source_.frames, T_base_cloud_, frame, stamp_ns, transforms_);
   }
 
+  absl::StatusOr<Pose> BaseAt(std::int64_t stamp_ns) {
+    const std::lock_guard lock(mutex_);
+    return BaseAtLocked(stamp_ns);
+  }
+
  private:
+  absl::StatusOr<Pose> BaseAtLocked(std::int64_t stamp_ns) {
+    if (source_.topic != nullptr) return source_.topic->poses.At(stamp_ns);
+    return transforms_.Lookup(source_.frames.fixed, source_.frames.base, stamp_ns);
+  }
+
   const std::shared_ptr<RecordingSurvey> survey_;
   std::mutex mutex_;  // tracks and transforms are sorted when they are asked
   TransformTree& transforms_;
@@ -171,10 +187,10 @@ absl::StatusOr<PointCloud> ReadRecordedCloud(Recording& recording,
   return ScanOfMessage(message, encoding, T_scan_cloud, at_sensor);
 }
 
-// What became of the clouds of a topic.
+// What became of the clouds of a topic, or of its sweeps.
 struct Chosen {
   std::vector<ScanFile> scans;
-  std::size_t with_pose = 0;
+  std::size_t all = 0, with_pose = 0;
   absl::Status first_fault;  // of those without
   bool moved = false;        // clouds were in a frame in which the base moves
 };
@@ -191,14 +207,11 @@ std::function<absl::StatusOr<Pose>(double)> PosesAfter(const std::shared_ptr<Clo
 }
 
 Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
-                       RecordedTopic& topic,
+                       const RecordedTopic& topic,
                        const KeyframeSpacing& every,
                        const std::shared_ptr<CloudPoses>& poses) {
-  std::stable_sort(
-      topic.clouds.begin(), topic.clouds.end(), [](const RecordedCloud& a, const RecordedCloud& b) {
-        return a.stamp_ns < b.stamp_ns;
-      });
   Chosen chosen;
+  chosen.all = topic.clouds.size();
   KeyframeChooser chooser(every);
   for (std::size_t i = 0; i < topic.clouds.size(); ++i) {
     const RecordedCloud& cloud = topic.clouds[i];
@@ -228,6 +241,54 @@ Chosen ChooseKeyframes(const std::shared_ptr<Recording>& recording,
   return chosen;
 }
 
+// Where the base was in the middle of a sweep, if that is known of the laser, too.
+absl::StatusOr<Pose> PoseOfSweep(const LaserSweep& sweep,
+                                 const RecordedTopic& topic,
+                                 CloudPoses& poses) {
+  const std::string& frame = topic.frames[sweep.lines[sweep.lines.size() / 2].frame];
+  STRATA_RETURN_IF_ERROR(poses.At(frame, sweep.stamp_ns()).status());
+  return poses.BaseAt(sweep.stamp_ns());
+}
+
+Chosen ChooseSweeps(const std::shared_ptr<Recording>& recording,
+                    const RecordedTopic& topic,
+                    const BagScanOptions& options,
+                    const std::shared_ptr<CloudPoses>& poses) {
+  const LinePoses line_poses = [poses, frames = topic.frames](
+                                   std::uint32_t frame,
+                                   std::int64_t stamp_ns) -> absl::StatusOr<Pose> {
+    STRATA_ASSIGN_OR_RETURN(const CloudPose pose, poses->At(frames[frame], stamp_ns));
+    return pose.T_map_scan * pose.T_scan_cloud.value_or(Pose::Identity());
+  };
+  std::vector<LaserSweep> sweeps = SweepsOf(topic.clouds, options.sweep_s.value_or(kDefaultSweepS));
+  Chosen chosen;
+  chosen.all = sweeps.size();
+  KeyframeChooser chooser(options.every);
+  for (LaserSweep& sweep : sweeps) {
+    const absl::StatusOr<Pose> pose = PoseOfSweep(sweep, topic, *poses);
+    if (!pose.ok()) {
+      if (chosen.first_fault.ok()) chosen.first_fault = pose.status();
+      continue;
+    }
+    ++chosen.with_pose;
+    if (!chooser.Keep(1e-9 * static_cast<double>(sweep.stamp_ns()), *pose)) continue;
+    ScanFile& scan = chosen.scans.emplace_back();
+    scan.path = absl::StrCat(
+        recording->files()[sweep.lines[0].file], ":", topic.topic.name, ":", sweep.number);
+    scan.sequence = sweep.number;
+    scan.time = TimeOfStamp(sweep.stamp_ns());
+    scan.T_map_scan = *pose;
+    scan.read = [recording,
+                 sweep = std::move(sweep),
+                 encoding = topic.topic.encoding,
+                 T_map_scan = *pose,
+                 line_poses](std::size_t* /*at_sensor*/) {
+      return ReadSweep(*recording, sweep, encoding, T_map_scan, line_poses);
+    };
+  }
+  return chosen;
+}
+
 void TellOf(const RecordingSurvey& survey,
             const RecordedTopic& topic,
             const PoseSource& source,
@@ -240,10 +301,12 @@ void TellOf(const RecordingSurvey& survey,
     tell(absl::StrCat(
         "warning: ", used.bad, " messages of ", used.topic.name, " are left out: ", used.why));
   }
-  if (chosen.with_pose < topic.clouds.size()) {
+  const absl::string_view what = HasLines(topic) ? " sweeps" : " clouds";
+  if (chosen.with_pose < chosen.all) {
     tell(absl::StrCat("warning: ",
-                      topic.clouds.size() - chosen.with_pose,
-                      " clouds have no pose and are left out: ",
+                      chosen.all - chosen.with_pose,
+                      what,
+                      " have no pose and are left out: ",
                       chosen.first_fault.message()));
   }
   if (source.topic != nullptr && source.frames.base.empty()) {
@@ -256,11 +319,23 @@ void TellOf(const RecordingSurvey& survey,
   }
   tell(absl::StrCat(chosen.scans.size(),
                     " of ",
-                    topic.clouds.size(),
-                    " clouds of ",
+                    chosen.all,
+                    what,
+                    " of ",
                     topic.topic.name,
                     " with poses from ",
                     source.name));
+}
+
+// Frames that hang from joints which no message tells of are nowhere.
+absl::Status WithStillJoints(const absl::Status& fault, const std::set<std::string>& joints) {
+  if (joints.empty()) return fault;
+  return absl::Status(fault.code(),
+                      absl::StrCat(fault.message(),
+                                   "; no ",
+                                   kJointStateType,
+                                   " has a position of ",
+                                   absl::StrJoin(joints, ", ")));
 }
 
 }  // namespace
@@ -269,18 +344,37 @@ absl::StatusOr<std::vector<ScanFile>> ListBagScans(const std::vector<std::filesy
                                                    const BagScanOptions& options) {
   STRATA_ASSIGN_OR_RETURN(std::unique_ptr<Recording> opened, Recording::Open(paths));
   const std::shared_ptr<Recording> recording = std::move(opened);
-  STRATA_ASSIGN_OR_RETURN(RecordingSurvey surveyed, recording->Survey([&options](double share) {
+  std::optional<JointTransforms> joints;
+  if (!options.urdf.empty()) {
+    STRATA_ASSIGN_OR_RETURN(joints, JointTransforms::Read(options.urdf));
+  }
+  const auto progress = [&options](double share) {
     return options.progress ? options.progress(share) : absl::OkStatus();
-  }));
+  };
+  STRATA_ASSIGN_OR_RETURN(RecordingSurvey surveyed,
+                          recording->Survey(progress, joints.has_value() ? &*joints : nullptr));
   const auto survey = std::make_shared<RecordingSurvey>(std::move(surveyed));
   STRATA_ASSIGN_OR_RETURN(RecordedTopic* const topic, CloudTopic(*survey, options.topic));
+  if (options.sweep_s.has_value() && !HasLines(*topic)) {
+    return absl::InvalidArgumentError(absl::StrCat("a sweep is of lines of a laser (",
+                                                   kLaserScanType,
+                                                   "), and ",
+                                                   topic->topic.name,
+                                                   " has clouds"));
+  }
   STRATA_ASSIGN_OR_RETURN(const PoseSource source, ChoosePoseSource(*survey, options.poses_from));
   const auto poses = std::make_shared<CloudPoses>(survey, source, options.T_base_cloud);
-  Chosen chosen = ChooseKeyframes(recording, *topic, options.every, poses);
+  std::ranges::stable_sort(topic->clouds, {}, &RecordedCloud::stamp_ns);
+  Chosen chosen = HasLines(*topic) ? ChooseSweeps(recording, *topic, options, poses)
+                                   : ChooseKeyframes(recording, *topic, options.every, poses);
   if (chosen.scans.empty()) {
-    return Annotate(
-        chosen.first_fault,
-        absl::StrCat("no cloud of ", topic->topic.name, " has a pose from ", source.name));
+    return Annotate(WithStillJoints(chosen.first_fault, survey->still_joints),
+                    absl::StrCat("no ",
+                                 HasLines(*topic) ? "sweep" : "cloud",
+                                 " of ",
+                                 topic->topic.name,
+                                 " has a pose from ",
+                                 source.name));
   }
   TellOf(*survey, *topic, source, chosen, options.tell);
   return std::move(chosen.scans);

@@ -19,6 +19,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 
+#include "client/formats/bags/joint_transforms.h"
 #include "client/formats/bags/ros_messages.h"
 #include "client/formats/bags/unpack.h"
 #include "client/formats/scan_reader.h"
@@ -95,6 +96,14 @@ std::uint32_t FrameNumber(const std::string& frame, std::vector<std::string>& fr
 
 class Surveyor {
  public:
+  explicit Surveyor(const JointTransforms* joints) : joints_(joints) {
+    if (joints_ == nullptr) return;
+    survey_.still_joints = joints_->Moving();
+    for (const RosPose& transform : joints_->Fixed()) {
+      survey_.transforms.Add(transform, true).IgnoreError();  // links that have names
+    }
+  }
+
   // A message of a file whose topics are `topics`.
   absl::Status Add(const std::vector<BagTopic>& topics,
                    std::uint32_t file,
@@ -156,6 +165,8 @@ class Surveyor {
   absl::Status AddContent(std::uint32_t file, const BagMessage& message, RecordedTopic& recorded) {
     const std::string& type = recorded.topic.type;
     if (type == kPointCloudType) return AddCloud(file, message, recorded);
+    if (type == kLaserScanType) return AddLine(file, message, recorded);
+    if (type == kJointStateType && joints_ != nullptr) return AddJoints(message, recorded);
     if (IsPoseType(type)) return AddPoses(message, recorded);
     if (IsTransformsType(type)) return AddTransforms(message, recorded);
     return absl::OkStatus();
@@ -165,13 +176,40 @@ class Surveyor {
     STRATA_ASSIGN_OR_RETURN(const RosCloudHead head,
                             ReadRosCloudHead(message.bytes, recorded.topic.encoding));
     recorded.has_point_times = recorded.has_point_times || head.has_point_times;
-    if (head.points == 0) return absl::OkStatus();
+    if (head.points > 0) AddPlace(file, message, head.header, recorded);
+    return absl::OkStatus();
+  }
+
+  absl::Status AddLine(std::uint32_t file, const BagMessage& message, RecordedTopic& recorded) {
+    STRATA_ASSIGN_OR_RETURN(const RosLaserScan scan,
+                            ReadRosLaserScan(message.bytes, recorded.topic.encoding));
+    if (scan.line.size() > 0) AddPlace(file, message, scan.header, recorded);
+    return absl::OkStatus();
+  }
+
+  void AddPlace(std::uint32_t file,
+                const BagMessage& message,
+                const RosHeader& header,
+                RecordedTopic& recorded) {
     ++poses_;
-    recorded.clouds.push_back({.stamp_ns = head.header.stamp_ns,
-                               .frame = FrameNumber(head.header.frame, recorded.frames),
+    recorded.clouds.push_back({.stamp_ns = header.stamp_ns,
+                               .frame = FrameNumber(header.frame, recorded.frames),
                                .file = file,
                                .place = message.place});
-    return absl::OkStatus();
+  }
+
+  absl::Status AddJoints(const BagMessage& message, const RecordedTopic& recorded) {
+    STRATA_ASSIGN_OR_RETURN(const RosJointState state,
+                            ReadRosJointState(message.bytes, recorded.topic.encoding));
+    if (state.positions.empty()) return absl::OkStatus();
+    for (const std::string& name : state.names) survey_.still_joints.erase(name);
+    absl::Status first_fault;
+    for (const RosPose& transform : joints_->At(state)) {
+      ++poses_;
+      const absl::Status added = survey_.transforms.Add(transform, false);
+      if (first_fault.ok()) first_fault = added;
+    }
+    return first_fault;
   }
 
   absl::Status AddPoses(const BagMessage& message, RecordedTopic& recorded) {
@@ -202,6 +240,7 @@ class Surveyor {
     return first_fault;
   }
 
+  const JointTransforms* const joints_;  // may be null
   RecordingSurvey survey_;
   std::vector<std::vector<std::size_t>> numbers_;  // by file and topic there
   std::size_t poses_ = 0;                          // and transforms and clouds
@@ -236,10 +275,10 @@ absl::StatusOr<std::unique_ptr<Recording>> Recording::Open(const std::vector<fs:
   return recording;
 }
 
-absl::StatusOr<RecordingSurvey> Recording::Survey(
-    absl::FunctionRef<absl::Status(double)> progress) {
+absl::StatusOr<RecordingSurvey> Recording::Survey(absl::FunctionRef<absl::Status(double)> progress,
+                                                  const JointTransforms* joints) {
   const std::lock_guard lock(mutex_);
-  Surveyor surveyor;
+  Surveyor surveyor(joints);
   for (std::uint32_t file = 0; file < readers_.size(); ++file) {
     BagReader& reader = *readers_[file];
     const absl::Status read = reader.Visit([&](const BagMessage& message) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +22,9 @@
 
 namespace strata {
 
-// A cloud with points, by its header and its place.
+class JointTransforms;
+
+// A cloud, or a line of a laser, with points, by its header and its place.
 struct RecordedCloud {
   std::int64_t stamp_ns = 0;
   std::uint32_t frame = 0;  // of RecordedTopic::frames
@@ -39,7 +42,7 @@ struct RecordedTopic {
   // Frames that the headers name, in the order of their first message; of transforms "odom ->
   // base". The first hundred.
   std::vector<std::string> frames;
-  // Of clouds:
+  // Of clouds and lines of a laser:
   std::vector<RecordedCloud> clouds;  // in the order of the files
   bool has_point_times = false;
   // Of poses: whose, as the first message says; empty where it does not.
@@ -51,8 +54,10 @@ struct RecordedTopic {
 
 struct RecordingSurvey {
   std::vector<RecordedTopic> topics;  // by name
-  TransformTree transforms;         // of all topics of transforms; those of …tf_static are fixed
-  std::vector<std::string> damage;  // lines that begin with the name of a file
+  // Of all topics of transforms, those of …tf_static fixed; and of the robot's joints.
+  TransformTree transforms;
+  std::set<std::string> still_joints;  // of the robot: no message has a position of them
+  std::vector<std::string> damage;     // lines that begin with the name of a file
 };
 
 // Whether a path is to be taken for a recording: a file that is a bag by its first bytes or its
@@ -68,10 +73,12 @@ class Recording {
   static absl::StatusOr<std::unique_ptr<Recording>> Open(
       const std::vector<std::filesystem::path>& paths);
 
-  // Reads all once: clouds by their heads, poses and transforms. `progress` is told the share that
-  // is done; an error of it ends the reading. RESOURCE_EXHAUSTED beyond ten million poses,
+  // Reads all once: clouds by their heads, poses and transforms, and with `joints` what messages
+  // about the robot's joints say. `progress` is told the share that is done; an error of it ends
+  // the reading. RESOURCE_EXHAUSTED beyond ten million poses,
   // transforms and clouds. Memory: a chunk, a message, 64 bytes a pose, 40 a cloud.
-  absl::StatusOr<RecordingSurvey> Survey(absl::FunctionRef<absl::Status(double)> progress);
+  absl::StatusOr<RecordingSurvey> Survey(absl::FunctionRef<absl::Status(double)> progress,
+                                         const JointTransforms* joints = nullptr);
 
   // The message of a cloud, unpacked. Thread-safe. DATA_LOSS if it is no longer there.
   absl::StatusOr<std::string> Read(const RecordedCloud& cloud);

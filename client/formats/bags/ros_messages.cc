@@ -1,6 +1,7 @@
 #include "client/formats/bags/ros_messages.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -13,11 +14,14 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include <Eigen/Core>
 
 #include "client/formats/bags/ros_cursor.h"
 #include "client/formats/parsing/cloud_builder.h"
 #include "client/formats/parsing/point_fields.h"
 #include "client/formats/parsing/scalar.h"
+#include "core/cloud/deskew.h"
+#include "core/cloud/point_cloud.h"
 #include "core/common/status.h"
 
 namespace strata {
@@ -163,6 +167,55 @@ absl::Status SettleRows(RosCloud& cloud, std::string& packed) {
   return absl::OkStatus();
 }
 
+// A sequence of numbers; empty, and the cursor at its end, where there are fewer than it says.
+template <typename T>
+std::vector<T> GetSequence(RosCursor& cursor) {
+  const std::size_t count = cursor.Get<std::uint32_t>();
+  std::vector<T> numbers;
+  if (count <= cursor.remaining() / sizeof(T)) numbers.reserve(count);
+  for (std::size_t i = 0; i < count && cursor.status().ok(); ++i) {
+    numbers.push_back(cursor.Get<T>());
+  }
+  return numbers;
+}
+
+// What of a laser's message the points come from.
+struct LaserReturns {
+  double first_rad = 0.0, step_rad = 0.0, step_s = 0.0;
+  float nearest_m = 0.0F, farthest_m = 0.0F;
+  std::vector<float> ranges_m, intensities;
+};
+
+LaserReturns GetReturns(RosCursor& cursor) {
+  LaserReturns returns;
+  returns.first_rad = cursor.Get<float>();
+  cursor.Get<float>();  // the last angle
+  returns.step_rad = cursor.Get<float>();
+  returns.step_s = cursor.Get<float>();
+  cursor.Get<float>();  // seconds from line to line
+  returns.nearest_m = cursor.Get<float>();
+  returns.farthest_m = cursor.Get<float>();
+  returns.ranges_m = GetSequence<float>(cursor);
+  returns.intensities = GetSequence<float>(cursor);
+  return returns;
+}
+
+PointCloud LineOf(const LaserReturns& returns) {
+  const bool has_intensity = returns.intensities.size() == returns.ranges_m.size();
+  PointCloud line;
+  for (std::size_t i = 0; i < returns.ranges_m.size(); ++i) {
+    const float d = returns.ranges_m[i];
+    if (!(d > 0.0F && d >= returns.nearest_m && d <= returns.farthest_m)) continue;
+    const auto at = static_cast<double>(i);
+    const double angle = returns.first_rad + at * returns.step_rad;
+    line.points.push_back(
+        Eigen::Vector3d(d * std::cos(angle), d * std::sin(angle), 0.0).cast<float>());
+    if (has_intensity) line.intensity.push_back(returns.intensities[i]);
+    if (returns.step_s != 0.0) line.time.push_back(at * returns.step_s);
+  }
+  return line;
+}
+
 RosPose GetPose(RosCursor& cursor, bool has_child) {
   RosPose pose;
   pose.header = GetHeader(cursor);
@@ -204,6 +257,45 @@ absl::StatusOr<PointCloud> ReadRosCloud(absl::string_view bytes, MessageEncoding
   if (cloud.height > 1) builder.SetGrid(cloud.height, cloud.width);
   AddPoints(fields, static_cast<std::size_t>(cloud.points()), cloud.big_endian, builder);
   return std::move(builder).Build();
+}
+
+absl::StatusOr<RosLaserScan> ReadRosLaserScan(absl::string_view bytes, MessageEncoding encoding) {
+  STRATA_ASSIGN_OR_RETURN(RosCursor cursor, RosCursor::Create(bytes, encoding));
+  RosLaserScan scan;
+  scan.header = GetHeader(cursor);
+  const LaserReturns returns = GetReturns(cursor);
+  STRATA_RETURN_IF_ERROR(cursor.status());
+  const double lasts_s = std::abs(returns.step_s) * static_cast<double>(returns.ranges_m.size());
+  if (!std::isfinite(returns.first_rad) || !std::isfinite(returns.step_rad) ||
+      !(lasts_s <= kLongestScanS)) {
+    return absl::InvalidArgumentError(absl::StrCat("a laser's line from ",
+                                                   returns.first_rad,
+                                                   " rad on in steps of ",
+                                                   returns.step_rad,
+                                                   " rad and ",
+                                                   returns.step_s,
+                                                   " s"));
+  }
+  scan.line = LineOf(returns);
+  STRATA_RETURN_IF_ERROR(ValidateCloud(scan.line));
+  return scan;
+}
+
+absl::StatusOr<RosJointState> ReadRosJointState(absl::string_view bytes, MessageEncoding encoding) {
+  STRATA_ASSIGN_OR_RETURN(RosCursor cursor, RosCursor::Create(bytes, encoding));
+  RosJointState state;
+  state.header = GetHeader(cursor);
+  const auto count = cursor.Get<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count && cursor.status().ok(); ++i) {
+    state.names.emplace_back(cursor.Text());
+  }
+  state.positions = GetSequence<double>(cursor);
+  STRATA_RETURN_IF_ERROR(cursor.status());
+  if (!state.positions.empty() && state.positions.size() != state.names.size()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        state.names.size(), " joints and ", state.positions.size(), " positions of joints"));
+  }
+  return state;
 }
 
 absl::StatusOr<std::vector<RosPose>> ReadRosPoses(const BagTopic& topic, absl::string_view bytes) {

@@ -17,6 +17,8 @@
 namespace strata {
 
 inline constexpr char kPointCloudType[] = "sensor_msgs/PointCloud2";
+inline constexpr char kLaserScanType[] = "sensor_msgs/LaserScan";
+inline constexpr char kJointStateType[] = "sensor_msgs/JointState";
 
 // std_msgs/Header. Frames come without the slash that early ROS puts before them.
 struct RosHeader {
@@ -39,6 +41,21 @@ struct RosCloudHead {
   bool has_point_times = false;  // a field t, time, timestamp, …
 };
 
+// A line of a laser whose mirror turns about z of its frame.
+struct RosLaserScan {
+  RosHeader header;
+  // d (cos α, sin α, 0), thesis 4.4, with the seconds after the stamp as times, unless they are all
+  // 0, and intensities where there is one for each; returns out of the laser's own bounds are left
+  // out.
+  PointCloud line;
+};
+
+struct RosJointState {
+  RosHeader header;
+  std::vector<std::string> names;
+  std::vector<double> positions;  // [rad or m], beside the names; empty where only speeds are told
+};
+
 // Whether ReadRosPoses reads them, from "nav_msgs/Odometry", "geometry_msgs/PoseStamped",
 // "geometry_msgs/PoseWithCovarianceStamped".
 bool IsPoseType(absl::string_view type);
@@ -52,6 +69,11 @@ absl::StatusOr<RosCloudHead> ReadRosCloudHead(absl::string_view bytes, MessageEn
 // The cloud as ReadPcd would make it of the same fields (names as MeaningOf; rows make it
 // organised); fields of more than one number are left out.
 absl::StatusOr<PointCloud> ReadRosCloud(absl::string_view bytes, MessageEncoding encoding);
+
+// INVALID_ARGUMENT, too, for angles that are none and lines of more than 30 s.
+absl::StatusOr<RosLaserScan> ReadRosLaserScan(absl::string_view bytes, MessageEncoding encoding);
+// INVALID_ARGUMENT, too, if there are positions and not one for each name.
+absl::StatusOr<RosJointState> ReadRosJointState(absl::string_view bytes, MessageEncoding encoding);
 
 // One of a type that IsPoseType, any number of one that IsTransformsType.
 absl::StatusOr<std::vector<RosPose>> ReadRosPoses(const BagTopic& topic, absl::string_view bytes);

@@ -11,23 +11,14 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
 #include <urdf_model/model.h>
-#include <urdf_parser/urdf_parser.h>
 
-#include "client/formats/file_bytes.h"
 #include "client/formats/shapes/mesh_shape.h"
+#include "client/formats/shapes/urdf_model.h"
 #include "core/common/status.h"
 #include "core/geometry/pose.h"
 
 namespace strata {
 namespace {
-
-using Eigen::Vector3d;
-
-Pose PoseOf(const urdf::Pose& pose) {
-  const urdf::Rotation& q = pose.rotation;
-  return MakePose(Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized(),
-                  {pose.position.x, pose.position.y, pose.position.z});
-}
 
 class UrdfShape {
  public:
@@ -59,20 +50,8 @@ class UrdfShape {
   }
 
   Pose MovedBy(const urdf::Joint& joint) const {
-    const Pose origin = PoseOf(joint.parent_to_joint_origin_transform);
     const auto found = joints_.find(joint.name);
-    const double position = found == joints_.end() ? 0.0 : found->second;
-    const Vector3d axis(joint.axis.x, joint.axis.y, joint.axis.z);
-    if (position == 0.0 || axis.isZero()) return origin;
-    switch (joint.type) {
-      case urdf::Joint::REVOLUTE:
-      case urdf::Joint::CONTINUOUS:
-        return origin * Pose(Eigen::AngleAxisd(position, axis.normalized()));
-      case urdf::Joint::PRISMATIC:
-        return origin * Pose(Eigen::Translation3d(position * axis.normalized()));
-      default:
-        return origin;
-    }
+    return JointTransform(joint, found == joints_.end() ? 0.0 : found->second);
   }
 
   absl::Status AddGeometry(const urdf::Geometry& geometry, const Pose& T) {
@@ -136,11 +115,7 @@ absl::Status CheckJoints(const urdf::ModelInterface& model, const JointPositions
 
 absl::StatusOr<CollisionShape> ReadUrdfShape(const std::string& file,
                                              const JointPositions& joints) {
-  STRATA_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(file));
-  const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(bytes);
-  if (model == nullptr || model->getRoot() == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(file, " is no robot description (URDF)"));
-  }
+  STRATA_ASSIGN_OR_RETURN(const urdf::ModelInterfaceSharedPtr model, ReadUrdf(file));
   STRATA_RETURN_IF_ERROR(CheckJoints(*model, joints));
   UrdfShape shape(std::filesystem::absolute(file).parent_path(), joints);
   STRATA_RETURN_IF_ERROR(shape.Add(*model->getRoot(), Pose::Identity()));

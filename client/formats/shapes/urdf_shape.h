@@ -1,4 +1,4 @@
-// Collision geometry of a robot description; the one place that knows urdfdom.
+// Collision geometry of a robot description.
 #ifndef STRATA_CLIENT_FORMATS_SHAPES_URDF_SHAPE_H_
 #define STRATA_CLIENT_FORMATS_SHAPES_URDF_SHAPE_H_
 

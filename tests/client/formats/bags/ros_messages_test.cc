@@ -42,6 +42,56 @@ void ExpectSomePose(const RosPose& pose) {
   for (int k = 0; k < 4; ++k) EXPECT_DOUBLE_EQ(std::abs(pose.quaternion[k]), 0.5);
 }
 
+TEST(RosMessagesTest, LinesOfALaserInEveryLayout) {
+  const float nan = std::nanf("");
+  for (const Layout layout : kLayouts) {
+    SCOPED_TRACE(static_cast<int>(layout));
+    // The laser's own bounds are 0.1 and 30 m.
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const RosLaserScan scan,
+        ReadRosLaserScan(
+            testing::LaserMessage(
+                layout, kStampNs, "laser", -0.5F, 0.25F, 0.001F, {2, 0, nan, 0.05F, 31, 4}),
+            EncodingOf(layout)));
+    EXPECT_EQ(scan.header.stamp_ns, kStampNs);
+    EXPECT_EQ(scan.header.frame, "laser");
+    ASSERT_EQ(scan.line.size(), 2U);
+    EXPECT_NEAR(scan.line.points[0].x(), 2 * std::cos(0.5), 1e-6);
+    EXPECT_NEAR(scan.line.points[0].y(), -2 * std::sin(0.5), 1e-6);
+    EXPECT_NEAR(scan.line.points[1].x(), 4 * std::cos(0.75), 1e-6);
+    EXPECT_NEAR(scan.line.points[1].y(), 4 * std::sin(0.75), 1e-6);
+    EXPECT_EQ(scan.line.points[1].z(), 0.0F);
+    ASSERT_EQ(scan.line.time.size(), 2U);
+    EXPECT_NEAR(scan.line.time[1], 0.005, 1e-8);
+  }
+  EXPECT_THAT(ReadRosLaserScan(testing::LaserMessage(Layout::kCdr, 0, "laser", 0, 0.1F, 20, {1, 1}),
+                               MessageEncoding::kCdr),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("in steps of 0.1")));
+  const std::string whole = testing::LaserMessage(Layout::kCdr, 0, "laser", 0, 1, 0, {1, 1});
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_EQ(ReadRosLaserScan(whole.substr(0, size), MessageEncoding::kCdr).status().code(),
+              absl::StatusCode::kInvalidArgument);
+  }
+}
+
+TEST(RosMessagesTest, JointsInEveryLayout) {
+  for (const Layout layout : kLayouts) {
+    SCOPED_TRACE(static_cast<int>(layout));
+    STRATA_ASSERT_OK_AND_ASSIGN(
+        const RosJointState state,
+        ReadRosJointState(testing::JointMessage(layout, kStampNs, {{"pan", 0.25}, {"tilt", -1}}),
+                          EncodingOf(layout)));
+    EXPECT_EQ(state.header.stamp_ns, kStampNs);
+    EXPECT_THAT(state.names, ElementsAre("pan", "tilt"));
+    EXPECT_THAT(state.positions, ElementsAre(0.25, -1.0));
+  }
+  const std::string whole = testing::JointMessage(Layout::kCdr, 0, {{"pan", 0.25}});
+  for (std::size_t size = 0; size + 8 < whole.size(); ++size) {
+    EXPECT_EQ(ReadRosJointState(whole.substr(0, size), MessageEncoding::kCdr).status().code(),
+              absl::StatusCode::kInvalidArgument);
+  }
+}
+
 TEST(RosMessagesTest, PosesInEveryLayout) {
   for (const Layout layout : kLayouts) {
     SCOPED_TRACE(static_cast<int>(layout));
