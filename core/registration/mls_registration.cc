@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 
@@ -43,14 +44,14 @@ class RoundSolver {
       : source_(source), target_(target), options_(options), surfaces_(source, target, options) {}
 
   // `T_local_source`: into the grids' coordinates.
-  Round Solve(const Pose& T_local_source, double gate_m, bool fine) {
+  Round Solve(const Pose& T_local_source, const Pose& T_guess, double gate_m, bool fine) {
     return options_.metric == MlsErrorMetric::kPlaneToPlane
-               ? PlaneToPlane(T_local_source, gate_m, fine)
+               ? PlaneToPlane(T_local_source, T_guess, gate_m, fine)
                : PointToPoint(T_local_source, gate_m);
   }
 
  private:
-  Round PlaneToPlane(const Pose& T_local_source, double gate_m, bool fine);
+  Round PlaneToPlane(const Pose& T_local_source, const Pose& T_guess, double gate_m, bool fine);
   Round PointToPoint(const Pose& T_local_source, double gate_m);
 
   const ScanFeatures& source_;
@@ -59,7 +60,26 @@ class RoundSolver {
   PlaneToPlaneMatcher surfaces_;
 };
 
-Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool fine) {
+// The step with what is known of the guess, which is at `T_now_guess`, as one more measurement;
+// `step` without.
+Vector6d StepWithGuess(const NormalEquations& held,
+                       const Vector6d& step,
+                       const Pose& T_now_guess,
+                       const MlsRegistrationOptions& options) {
+  if (options.guess_sigma_m <= 0.0 || options.guess_sigma_rad <= 0.0) return step;
+  Vector6d information;
+  information.head<3>().setConstant(1.0 / std::pow(options.guess_sigma_rad, 2));
+  information.tail<3>().setConstant(1.0 / std::pow(options.guess_sigma_m, 2));
+  Vector6d back;
+  back << So3Log(T_now_guess.linear()), T_now_guess.translation();
+  const Matrix6d prior = information.asDiagonal();
+  return (held.H + prior).ldlt().solve(held.b + prior * back);
+}
+
+Round RoundSolver::PlaneToPlane(const Pose& T_local_source,
+                                const Pose& T_guess,
+                                double gate_m,
+                                bool fine) {
   const PlaneToPlaneSums sums = surfaces_.Linearise(T_local_source, gate_m, fine);
   Round round;
   round.selected = sums.selected;
@@ -75,6 +95,8 @@ Round RoundSolver::PlaneToPlane(const Pose& T_local_source, double gate_m, bool 
   const NormalEquations held =
       WithoutSliding({sums.H, sums.b}, sums.H_across, least * full, radius_m);
   round.solution = SolveNormalEquations(held.H, held.b, radius_m, options_.min_eigenvalue_ratio);
+  round.solution.step =
+      StepWithGuess(held, round.solution.step, T_local_source.inverse() * T_guess, options_);
   // Residuals larger than the assumed σ take their share from the information.
   const double variance_factor = std::max(1.0, sums.squared_error / sums.inliers);
   round.information = round.solution.information / variance_factor;
@@ -144,6 +166,8 @@ absl::Status MlsRegistrationOptions::Validate() const {
   checks.InRange("max_rotation_rad", max_rotation_rad, 0.0, 3.15);
   checks.InRange("min_eigenvalue_ratio", min_eigenvalue_ratio, 0.0, 1.0);
   checks.InRange("min_hold", min_hold, 0.0, 1.0);
+  checks.InRange("guess_sigma_m", guess_sigma_m, 0.0, 1000.0);
+  checks.InRange("guess_sigma_rad", guess_sigma_rad, 0.0, 1000.0);
   checks.InRange("neighbours", neighbours, 4, ColumnGrid::kMaxNeighbours);
   checks.InRange("neighbour_radius_m", neighbour_radius_m, 0.01, 100.0);
   return checks.status();
@@ -180,7 +204,7 @@ RegistrationResult RegisterScan(const ScanFeatures& source,
   for (result.iterations = 1;; ++result.iterations) {
     const bool narrow = gate_m <= options.final_gate_m;
     const bool fine = narrow && settled;
-    const Round round = solver.Solve(T, gate_m, fine);
+    const Round round = solver.Solve(T, T_guess, gate_m, fine);
     result.inliers = round.inliers;
     result.overlap = round.selected > 0 ? static_cast<double>(round.inliers) / round.selected : 0.0;
     result.rms_m = round.rms_m;

@@ -59,6 +59,11 @@ struct MlsRegistrationOptions {
   // sensor moves with it: floors slide to where they overlap most. 0 for an object seen from
   // outside, whose overlap is right. In [0, 1].
   double min_hold = 0.0025;
+  // For kPlaneToPlane: the guess is one more measurement, with these σ of each direction. Where
+  // many features hold one that is nothing; where few do, they are often false. 0, either: it is
+  // none. In [0, 1000].
+  double guess_sigma_m = 0.0;
+  double guess_sigma_rad = 0.0;
   // Target side of the surface elements, as ScanFeatureOptions has them for the source.
   int neighbours = 16;
   double neighbour_radius_m = 1.5;

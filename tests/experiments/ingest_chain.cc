@@ -268,6 +268,9 @@ int Main(int argc, char** argv) {
   app.add_option("--robust", settings.registration.robust_width);
   app.add_option("--normal-sigma", settings.registration.normal_sigma_m);
   app.add_option("--tangent-sigma", settings.registration.tangent_sigma_m);
+  app.add_option("--min-hold", settings.registration.min_hold);
+  app.add_option("--guess-sigma-m", settings.registration.guess_sigma_m);
+  app.add_option("--guess-sigma-rad", settings.registration.guess_sigma_rad);
   app.add_option("--min-overlap", settings.registration.min_overlap);
   app.add_option("--seed", settings.features.seed);
   app.add_option("--neighbour-count", settings.registration.neighbours);

@@ -90,7 +90,7 @@ absl::Status Show(Context& context, const PoseGraphOptions& options) {
                        {"enabled", "ENABLED"},
                        {"may_be_false", "MAY BE FALSE"},
                        {"residual_m", "RESIDUAL [M]"},
-                       {"residual_rad", "[RAD]"},
+                       {"residual_rad", "TURN"},
                        {"chi2", "CHI2"},
                        {"note", "NOTE"}});
   return absl::OkStatus();

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <ostream>
 #include <string>
 #include <utility>
@@ -10,6 +12,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
@@ -53,6 +56,18 @@ std::string Block(const std::string& text, std::size_t columns, std::size_t inde
                        "\n" + std::string(indent, ' '));
 }
 
+// To a tenth of a degree, and small ones to three digits.
+std::string DegreesOf(double angle_rad) {
+  const double degrees = angle_rad * 180.0 / std::numbers::pi;
+  return std::abs(degrees) < 10.0 ? absl::StrFormat("%.3g°", degrees)
+                                  : absl::StrFormat("%.1f°", degrees);
+}
+
+std::string CellOf(const std::string& key, const Json& value) {
+  const bool is_angle = absl::EndsWith(key, "_rad") && value.is_number();
+  return is_angle ? DegreesOf(value.get<double>()) : TextOf(value);
+}
+
 // A table of text: cells, widths, and what stands right.
 struct Table {
   std::vector<std::string> keys;
@@ -69,7 +84,7 @@ Table TableOf(const Json& rows, const std::vector<Column>& columns, std::size_t 
     table.lines[0].push_back(column.title);
     std::size_t width = ShownWidth(column.title);
     for (std::size_t r = 0; r < shown; ++r) {
-      table.lines[r + 1].push_back(TextOf(rows[r].value(column.key, Json())));
+      table.lines[r + 1].push_back(CellOf(column.key, rows[r].value(column.key, Json())));
       width = std::max(width, ShownWidth(table.lines[r + 1].back()));
     }
     table.widths.push_back(width);

@@ -47,7 +47,8 @@ class Output {
   bool text() const { return format_ == OutputFormat::kText; }
   // One thing: as JSON an object, as text a line "key  value" for each key.
   void Object(const Json& object);
-  // Several things of a kind: as JSON an array of objects, as text a table of `columns`.
+  // Several things of a kind: as JSON an array of objects, as text a table of `columns`, in which
+  // angles (keys that end in _rad) are degrees.
   void List(const Json& rows, const std::vector<Column>& columns);
   // One of an unknown number of things: JSON on one line, also as text; as CSV a row with the keys
   // of the first.

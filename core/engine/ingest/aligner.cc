@@ -35,6 +35,9 @@ constexpr std::size_t kLostTried = 3;
 // So few scans of a pass are matched whatever their height: a ramp leads from one to the next.
 constexpr std::size_t kJustBefore = 3;
 
+// As many steps back the robot's word is judged by.
+constexpr std::size_t kStepsJudged = 100;
+
 bool OnOneStorey(const Pose& a, const Pose& b) {
   return std::abs(a.translation().z() - b.translation().z()) <= kSameStoreyM;
 }
@@ -82,6 +85,7 @@ void Aligner::Add(const ScanRecord& scan, const Placement& placement) {
   scans_.push_back({scan.number,
                     scan.header.T_map_scan,
                     scan.header.sensor_origin.cast<double>(),
+                    placement.report.aligned,
                     !is_first && !placement.report.aligned && placement.report.iterations > 0,
                     segment});
   poses_.push_back(placement.T_map_scan);
@@ -138,6 +142,22 @@ Pose Aligner::Guess(const ScanRecord& scan) const {
   const std::size_t predecessor = std::prev(next)->second;
   return Normalized(poses_[predecessor] * scans_[predecessor].T_map_scan_uploaded.inverse() *
                     header.T_map_scan);
+}
+
+std::optional<OdometryNoise> Aligner::NoiseBefore(const ScanId& id) const {
+  const auto trajectory = trajectories_.find(id.trajectory);
+  if (trajectory == trajectories_.end()) return std::nullopt;
+  std::vector<std::optional<Pose>> errors;
+  auto after = trajectory->second.lower_bound(id.sequence);
+  if (after == trajectory->second.begin()) return std::nullopt;
+  for (--after; after != trajectory->second.begin() && errors.size() < kStepsJudged; --after) {
+    const std::size_t i = std::prev(after)->second, j = after->second;
+    const Pose said = scans_[i].T_map_scan_uploaded.inverse() * scans_[j].T_map_scan_uploaded;
+    const Pose measured = poses_[i].inverse() * poses_[j];
+    errors.push_back(scans_[j].is_aligned ? std::optional<Pose>(said.inverse() * measured)
+                                          : std::nullopt);
+  }
+  return EstimateOdometryNoise(errors);
 }
 
 void Aligner::Keep(ScanNumber number, const Features& features) {
@@ -335,7 +355,8 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   const std::vector<std::size_t> pass = Believed(OwnPass(scan.header.id, guess));
   STRATA_ASSIGN_OR_RETURN(const Neighbourhood around, NeighboursOf(guess, pass, reader, source));
   if (around.seen.empty()) return PlaceAmongOthers(scan.number, seen, guess, reader, source);
-  const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass);
+  const std::optional<OdometryNoise> noise = NoiseBefore(scan.header.id);
+  const Link link = LinkScan(seen, around.seen, guess, Nearness::kSamePass, noise);
   placement.report = link.report;
   if (!link.report.aligned) {
     return PlaceAmongLost(scan, seen, std::move(placement), reader, source);
@@ -346,7 +367,7 @@ absl::StatusOr<Placement> Aligner::Place(const ScanRecord& scan,
   STRATA_ASSIGN_OR_RETURN(const Neighbourhood all,
                           NeighboursOf(link.T_map_scan, level, reader, source));
   if (all.indices == around.indices) return placement;
-  const Link joint = AgreeingLink(seen, all.seen, link.T_map_scan);
+  const Link joint = AgreeingLink(seen, all.seen, link.T_map_scan, noise);
   if (joint.report.aligned) placement.T_map_scan = joint.T_map_scan;
   STRATA_ASSIGN_OR_RETURN(
       const Neighbourhood apart,

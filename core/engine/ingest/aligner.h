@@ -18,6 +18,7 @@
 #include "core/common/lru_cache.h"
 #include "core/engine/ingest/link.h"
 #include "core/engine/scans/scan_source.h"
+#include "core/posegraph/alignment/odometry_noise.h"
 #include "core/registration/place_match.h"
 #include "core/registration/scan_features.h"
 #include "core/storage/storage.h"
@@ -62,6 +63,7 @@ class Aligner {
     ScanNumber number;
     Pose T_map_scan_uploaded;
     Eigen::Vector3d sensor_origin;  // scan frame
+    bool is_aligned = false;        // its pose is more than the robot's word
     bool is_lost = false;           // others of its pass were around, and none said where it is
     std::size_t segment = 0;        // of its trajectory, by the first scan's place in scans_
   };
@@ -73,6 +75,8 @@ class Aligner {
   };
 
   Pose Guess(const ScanRecord& scan) const;
+  // What the last steps of its trajectory before it say of the robot's word.
+  std::optional<OdometryNoise> NoiseBefore(const ScanId& id) const;
   // Indices into scans_, ascending: scans of its trajectory just before and after, on its storey or
   // on the way there,
   std::vector<std::size_t> OwnPass(const ScanId& id, const Pose& guess);

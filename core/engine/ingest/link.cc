@@ -34,6 +34,10 @@ constexpr double kLittleContradiction = 0.02;
 // fits better than this, the scan was not taken here. Of 51 drawn that slide and were right two had
 // less than 0.95, both contradicted by 0.06 and more.
 constexpr double kLeastShareOfBest = 0.9;
+// What slides is left where the robot says, and then seems to say the same: no robot is taken to be
+// better.
+constexpr double kLeastSigmaM = 0.02;
+constexpr double kLeastSigmaRad = 0.003;
 // Scans of another pass show the same at least to this share.
 constexpr double kLeastAgreement = 0.5;
 
@@ -70,11 +74,17 @@ Link LinkOf(const RegistrationResult& match) {
 
 RegistrationResult Register(const SeenScan& scan,
                             std::span<const SeenScan> around,
-                            const Pose& guess) {
+                            const Pose& guess,
+                            const std::optional<OdometryNoise>& noise = {}) {
   std::vector<PlacedScan> placed;
   for (const SeenScan& other : around) placed.push_back({other.features, other.T_target_scan});
   const RegistrationTarget target(placed, TargetOptions{.centre = guess.translation()});
-  return RegisterScan(*scan.features, target, guess, EngineRegistrationOptions());
+  MlsRegistrationOptions options = EngineRegistrationOptions();
+  if (noise.has_value()) {
+    options.guess_sigma_m = std::max(noise->sigma_m, kLeastSigmaM);
+    options.guess_sigma_rad = std::max(noise->sigma_rad, kLeastSigmaRad);
+  }
+  return RegisterScan(*scan.features, target, guess, options);
 }
 
 // What is near for sure may be seen through more: glass, and people on their way.
@@ -141,8 +151,9 @@ bool MaySlide(const PlaceMatch& here) { return here.verdict == PlaceVerdict::kDe
 Link LinkScan(const SeenScan& scan,
               std::span<const SeenScan> around,
               const Pose& guess,
-              Nearness nearness) {
-  const RegistrationResult match = Register(scan, around, guess);
+              Nearness nearness,
+              const std::optional<OdometryNoise>& noise) {
+  const RegistrationResult match = Register(scan, around, guess, noise);
   Link link = LinkOf(match);
   const bool agrees = Accepted(match.termination) && Same(match.T_target_source, guess);
   if (agrees && SpeaksForItself(match, nearness)) return link;
@@ -169,8 +180,11 @@ Link LinkScan(const SeenScan& scan,
   return link;
 }
 
-Link AgreeingLink(const SeenScan& scan, std::span<const SeenScan> around, const Pose& known) {
-  const RegistrationResult match = Register(scan, around, known);
+Link AgreeingLink(const SeenScan& scan,
+                  std::span<const SeenScan> around,
+                  const Pose& known,
+                  const std::optional<OdometryNoise>& noise) {
+  const RegistrationResult match = Register(scan, around, known, noise);
   Link link = LinkOf(match);
   link.report.aligned = Accepted(match.termination) && match.overlap >= kLeastAgreement &&
                         Same(match.T_target_source, known);

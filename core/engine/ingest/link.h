@@ -4,9 +4,11 @@
 #ifndef STRATA_CORE_ENGINE_INGEST_LINK_H_
 #define STRATA_CORE_ENGINE_INGEST_LINK_H_
 
+#include <optional>
 #include <span>
 
 #include "core/geometry/pose.h"
+#include "core/posegraph/alignment/odometry_noise.h"
 #include "core/registration/place_match.h"
 #include "core/world/scan.h"
 
@@ -24,18 +26,21 @@ enum class Nearness {
   kSaid,      // the frames of two robots or runs say so
 };
 
-// Of `scan` (its pose is ignored) to `around`, in the map. A pure function; REQUIRES at least one
-// scan around.
+// Of `scan` (its pose is ignored) to `around`, in the map. `noise` is how well the robot says where
+// it went, where that is known: of scans of one pass it counts beside what surfaces say, here and
+// below. A pure function; REQUIRES at least one scan around.
 Link LinkScan(const SeenScan& scan,
               std::span<const SeenScan> around,
               const Pose& T_map_scan_guess,
-              Nearness nearness);
+              Nearness nearness,
+              const std::optional<OdometryNoise>& noise = {});
 
 // The same to scans of any pass, for one whose place is known already: holds where they agree with
 // it.
 Link AgreeingLink(const SeenScan& scan,
                   std::span<const SeenScan> around,
-                  const Pose& T_map_scan_known);
+                  const Pose& T_map_scan_known,
+                  const std::optional<OdometryNoise>& noise = {});
 
 // The same, and they are verified to show one place.
 Link VerifiedLink(const SeenScan& scan,

@@ -339,6 +339,17 @@ TEST(RegisterScanTest, ConvergesAndSaysSo) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(r.information).eigenvalues()[0], 0.0);
 }
 
+TEST(RegisterScanTest, WhatSurfacesHoldIsNotDrawnToTheGuess) {
+  const ScanFeatures target = Features(Yard(Pose::Identity(), 1));
+  MlsRegistrationOptions options;
+  options.guess_sigma_m = 0.02;
+  options.guess_sigma_rad = 0.003;
+  const Pose guess = kTruth * Step(0.006, 0.004, -0.008, 0.04, 0.04, -0.03);
+  const auto r = RegisterScan(Features(Yard(kTruth, 2)), TargetOf(target), guess, options);
+  EXPECT_EQ(r.termination, Termination::kConverged);
+  EXPECT_LT((kTruth.inverse() * r.T_target_source).translation().norm(), 0.01);
+}
+
 TEST(RegisterScanTest, SeveralScansMakeOneTarget) {
   std::vector<ScanFeatures> scans;
   std::vector<Pose> poses;

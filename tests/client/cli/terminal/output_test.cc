@@ -21,6 +21,17 @@ TEST(OutputTest, TableAlignsNumbersRightAndWordsLeft) {
   EXPECT_EQ(talk.str(), "");
 }
 
+TEST(OutputTest, AnglesOfATableAreDegrees) {
+  const Json rows = {{{"turn_rad", 0.35}}, {{"turn_rad", -0.001}}, {{"turn_rad", Json()}}};
+  std::ostringstream data;
+  std::ostringstream json;
+  std::ostringstream talk;
+  Output(OutputFormat::kText, data, talk).List(rows, {{"turn_rad", "TURN"}});
+  EXPECT_EQ(data.str(), "    TURN\n   20.1°\n-0.0573°\n       -\n");
+  Output(OutputFormat::kJson, json, talk).List(rows, {{"turn_rad", "TURN"}});
+  EXPECT_EQ(Json::parse(json.str()), rows);
+}
+
 TEST(OutputTest, ObjectIsKeysAndValuesOrJson) {
   const Json object = {{"name", "a"}, {"box", {1.5, 2}}, {"empty", Json::array()}, {"yes", true}};
   std::ostringstream text;
