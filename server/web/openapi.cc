@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include <nlohmann/json.hpp>
 
+#include "server/web/comments.h"
 #include "strata/v1/bounds.pb.h"
 
 namespace strata::server::web {
@@ -20,27 +22,38 @@ json Reference(const std::string& name) {
   return {{"$ref", absl::StrCat("#/components/schemas/", name)}};
 }
 
+// `description` of an object, where there is one.
+json Described(json object, std::string description) {
+  if (!description.empty()) object["description"] = std::move(description);
+  return object;
+}
+
 // Schemas of messages and enumerations, each once.
 class Schemas {
  public:
+  explicit Schemas(const Comments& comments) : comments_(comments) {}
   json Of(const pb::Descriptor& message) {
     if (seen_.insert(message.full_name()).second) {
       json schema = {{"type", "object"}, {"properties", json::object()}};
       for (int i = 0; i < message.field_count(); ++i) {
         const pb::FieldDescriptor& field = *message.field(i);
-        schema["properties"][field.name()] = OfField(field);
+        schema["properties"][field.name()] = Described(OfField(field), comments_.Of(field));
       }
-      all_[message.full_name()] = std::move(schema);
+      all_[message.full_name()] = Described(std::move(schema), comments_.Of(message));
     }
     return Reference(message.full_name());
   }
   json Of(const pb::EnumDescriptor& enumeration) {
     if (seen_.insert(enumeration.full_name()).second) {
       json schema = {{"type", "string"}};
+      std::string description = comments_.Of(enumeration);
       for (int i = 0; i < enumeration.value_count(); ++i) {
-        schema["enum"].push_back(enumeration.value(i)->name());
+        const pb::EnumValueDescriptor& value = *enumeration.value(i);
+        schema["enum"].push_back(value.name());
+        const std::string said = comments_.Of(value);
+        if (!said.empty()) absl::StrAppend(&description, "\n- ", value.name(), ": ", said);
       }
-      all_[enumeration.full_name()] = std::move(schema);
+      all_[enumeration.full_name()] = Described(std::move(schema), std::move(description));
     }
     return Reference(enumeration.full_name());
   }
@@ -91,6 +104,7 @@ class Schemas {
     return json::object();
   }
 
+  const Comments& comments_;
   std::set<std::string> seen_;
   json all_ = json::object();
 };
@@ -110,7 +124,7 @@ json ErrorSchema() {
             {"details", {{"type", "array"}, {"items", {{"type", "object"}}}}}}}};
 }
 
-json OperationOf(const pb::MethodDescriptor& method, Schemas& schemas) {
+json OperationOf(const pb::MethodDescriptor& method, const Comments& comments, Schemas& schemas) {
   const bool stream = method.server_streaming();
   const char* type = stream ? "application/connect+json" : "application/json";
   json operation = {
@@ -125,11 +139,14 @@ json OperationOf(const pb::MethodDescriptor& method, Schemas& schemas) {
                   : "the answer"},
           {"content", {{type, {{"schema", schemas.Of(*method.output_type())}}}}}}},
         {"default", ErrorResponse()}}}};
+  std::string description = comments.Of(method);
   if (stream) {
-    operation["description"] =
-        "The request, too, is in an envelope: a byte 0, its size in four bytes (big-endian).";
+    absl::StrAppend(
+        &description,
+        description.empty() ? "" : "\n\n",
+        "The request, too, is in an envelope: a byte 0, its size in four bytes (big-endian).");
   }
-  return operation;
+  return Described(std::move(operation), std::move(description));
 }
 
 json TileOperation() {
@@ -161,14 +178,17 @@ json TileOperation() {
 }  // namespace
 
 std::string OpenApiOf(const Contract& contract) {
-  Schemas schemas;
+  const Comments comments;
+  Schemas schemas(comments);
   json paths = json::object();
+  json tags = json::array();
   for (const pb::ServiceDescriptor* service : contract.services()) {
+    tags.push_back(Described({{"name", service->name()}}, comments.Of(*service)));
     for (int i = 0; i < service->method_count(); ++i) {
       const pb::MethodDescriptor& method = *service->method(i);
       if (method.client_streaming()) continue;
       paths[absl::StrCat("/", service->full_name(), "/", method.name())]["post"] =
-          OperationOf(method, schemas);
+          OperationOf(method, comments, schemas);
     }
   }
   paths["/v1/maps/{map}/tiles/{level}/{x}/{y}"]["get"] = TileOperation();
@@ -177,6 +197,7 @@ std::string OpenApiOf(const Contract& contract) {
   const json document = {
       {"openapi", "3.1.0"},
       {"info", {{"title", "Strata"}, {"version", STRATA_VERSION}}},
+      {"tags", std::move(tags)},
       {"security", json::array({json::object(), {{"token", json::array()}}})},
       {"paths", std::move(paths)},
       {"components",

@@ -9,7 +9,7 @@
 namespace strata::server::web {
 
 // JSON: a POST for every method without a stream of requests, schemas of all messages they take and
-// give, with names as in the .proto, and the GET of tiles.
+// give, with names and comments as in the .proto, and the GET of tiles.
 std::string OpenApiOf(const Contract& contract);
 
 }  // namespace strata::server::web

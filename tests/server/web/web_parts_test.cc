@@ -209,6 +209,29 @@ TEST(OpenApiTest, HasEveryMethodThatHttpReachesAndEverySchemaItNames) {
   EXPECT_GT(references, 100);
 }
 
+TEST(OpenApiTest, SaysWhatTheProtoFilesSay) {
+  const auto document = nlohmann::json::parse(OpenApiOf(MapsAndMore()));
+  for (const auto& tag : document["tags"]) EXPECT_TRUE(tag.contains("description")) << tag;
+  for (const auto& [path, operations] : document["paths"].items()) {
+    if (!operations.contains("post")) continue;
+    EXPECT_TRUE(operations["post"].contains("description")) << path;
+  }
+  const auto& schemas = document["components"]["schemas"];
+  for (const auto& [name, schema] : schemas.items()) {
+    if (name == "Error") continue;
+    EXPECT_TRUE(schema.contains("description")) << name;
+    if (!schema.contains("properties")) continue;
+    for (const auto& [field, about] : schema["properties"].items()) {
+      EXPECT_TRUE(about.contains("description")) << name << "." << field;
+    }
+  }
+  const auto& surface = schemas["strata.v1.Surface"]["properties"];
+  EXPECT_EQ(surface["depth_m"]["description"],
+            "Length of a vertical interval below z_m [m]; 0: horizontal.");
+  const std::string kinds = schemas["strata.v1.Traversability"]["description"];
+  EXPECT_THAT(kinds, HasSubstr("- TRAVERSABILITY_UNDERSIDE: Seen from below only"));
+}
+
 TEST(TilePathTest, IsReadStrictly) {
   const auto tile = ParseTilePath("/v1/maps/a%2Fb/tiles/3/-1/2");
   ASSERT_TRUE(tile.has_value());

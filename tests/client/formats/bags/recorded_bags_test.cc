@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "client/formats/bags/bag_reader.h"
+#include "client/formats/bags/bag_scans.h"
 #include "tests/support/data_dir.h"
 #include "tests/support/status_matchers.h"
 
@@ -136,6 +138,30 @@ TEST(RecordedBagsTest, TwinsAreTheSame) {
     ++twins;
   }
   EXPECT_EQ(twins, 18U);
+}
+
+// Returns that a reader of its own (Python: struct) counts in each two seconds of a laser that a
+// robot carries level.
+constexpr std::size_t kReturns[] = {
+    24365, 22971, 22847, 22909, 22993, 23012, 21577, 23008, 22967, 23009, 23000, 22925};
+
+TEST(RecordedBagsTest, SweepsOfALevelLaserHaveItsReturns) {
+  STRATA_REQUIRE_DATA(path, "importer_samples");
+  BagScanOptions options;
+  options.topic = "/driver_laser_navigation/laser_scan";
+  options.poses_from = "tf:map->base_footprint";
+  options.every.distance_m = 0.0;
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
+                              ListBagScans({path / "ros1_jarvis_laser.bag"}, options));
+  ASSERT_EQ(scans.size(), std::size(kReturns));
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud cloud, ReadScanFile(scans[i]));
+    EXPECT_EQ(cloud.size(), kReturns[i]) << i;
+    EXPECT_EQ(cloud.intensity.size(), kReturns[i]) << i;
+    for (const Eigen::Vector3f& p : cloud.points) {
+      ASSERT_NEAR(p.z(), cloud.sensor_origin.z(), 1e-3) << i;
+    }
+  }
 }
 
 }  // namespace
