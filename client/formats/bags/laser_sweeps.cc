@@ -64,7 +64,7 @@ std::vector<LaserSweep> SweepsOf(const std::vector<RecordedCloud>& lines, double
     sweeps.back().lines.push_back(line);
   }
   if (sweeps.size() < 2) return sweeps;
-  // Half a line's time is what stamps may be off by.
+  // Where its border falls between two stamps a whole sweep has a line less than the one before.
   const std::size_t whole = sweeps[sweeps.size() - 2].lines.size();
   if (sweeps.back().lines.size() + 1 < whole) sweeps.pop_back();
   return sweeps;
