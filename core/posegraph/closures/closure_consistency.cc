@@ -24,6 +24,15 @@ namespace {
 constexpr double kHoldsM = 0.5;
 constexpr double kHoldsRad = 0.05;
 constexpr double kStoreysM = 6.0;  // one, or two low ones
+// Within one part: what is moved up or down by a storey at least, and not by half as much aside.
+constexpr double kStoreyM = 1.5;
+constexpr double kAsideShare = 0.5;
+// Believed within so many σ of the graph; and, where as many closures of half its σ at least show
+// how many σ the graph errs by in fact, within so many times that.
+constexpr double kStoreySigmas = 1.2;
+constexpr std::size_t kEnoughClosures = 8;
+constexpr double kComparableShare = 0.5;
+constexpr double kUsualErrors = 5.0;
 
 // Consistency as a graph over the closures of one group.
 class Cliques {
@@ -94,7 +103,7 @@ class ConsistencyCheck {
           !one_part && std::ranges::any_of(members, [this](std::size_t c) { return IsAsSaid(c); });
       std::vector<std::size_t> believable;
       for (const std::size_t c : members) {
-        const bool may_be_true = one_part     ? AgreesWithGraph(c)
+        const bool may_be_true = one_part     ? AgreesWithGraph(c) && !IsOnOtherStorey(c, members)
                                  : is_as_said ? IsAsSaid(c)
                                               : !IsStoreyOff(c);
         if (may_be_true) believable.push_back(c);
@@ -175,6 +184,39 @@ class ConsistencyCheck {
     return Within(closure.T_i_j.inverse() * T_i_j,
                   path.sigma_m * path.sigma_m + closure.sigma_m * closure.sigma_m,
                   path.sigma_rad * path.sigma_rad + closure.sigma_rad * closure.sigma_rad);
+  }
+
+  // From where the closure has its j to where the graph has it, in the map's frame.
+  Eigen::Vector3d ErrorOf(std::size_t c) const {
+    const Closure& closure = closures_[c];
+    return poses_[closure.j].translation() - (poses_[closure.i] * closure.T_i_j).translation();
+  }
+
+  double SigmaOf(std::size_t c) const {
+    return std::hypot(Path(2 * c, 2 * c + 1).sigma_m, closures_[c].sigma_m);
+  }
+
+  // Moved by a storey and hardly aside: storeys look alike, and nothing contradicts it but how well
+  // the graph is known.
+  bool IsOnOtherStorey(std::size_t c, const std::vector<std::size_t>& members) const {
+    const Eigen::Vector3d error = ErrorOf(c);
+    const double up_m = std::abs(error.z());
+    return up_m >= kStoreyM && error.head<2>().norm() <= kAsideShare * up_m &&
+           up_m > StoreySigmas(SigmaOf(c), members) * SigmaOf(c);
+  }
+
+  // How many σ a height may be off that the graph knows to `sigma_m`. What its σ allows for is
+  // seldom met: on a ramp with columns around the graph errs by a hundredth of it.
+  double StoreySigmas(double sigma_m, const std::vector<std::size_t>& members) const {
+    std::vector<double> errors;  // in σ
+    for (const std::size_t c : members) {
+      const double known_m = SigmaOf(c);
+      if (known_m >= kComparableShare * sigma_m) errors.push_back(ErrorOf(c).norm() / known_m);
+    }
+    if (errors.size() < kEnoughClosures) return kStoreySigmas;
+    const auto usual = errors.begin() + kEnoughClosures - 1;
+    std::nth_element(errors.begin(), usual, errors.end());
+    return std::min(kStoreySigmas, kUsualErrors * *usual);
   }
 
   // Round the loop i_a → j_a → j_b → i_b → i_a, each step known to its own σ. A rotation's error

@@ -53,7 +53,8 @@ struct ConsistentClosureSet {
 };
 
 // `edges` are the relative poses in force, without the closures. Closures within one part of the
-// graph must also agree with the graph itself, as far as its σ says. Closures of two parts are
+// graph must also agree with the graph itself, as far as its σ says; where they say another storey,
+// as far as the graph errs elsewhere (docs/decisions/0258). Closures of two parts are
 // checked against the others of the same two parts; where one agrees with what the frames of the
 // parts say (SaidHypothesis), it is enough, and those that do not agree are none; where none does,
 // those that agree but for up to 6 m of height are none: storeys look alike. The set is found

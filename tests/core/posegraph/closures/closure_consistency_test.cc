@@ -189,6 +189,61 @@ TEST(ClosureConsistencyTest, WithinOneTrajectoryTheGraphItselfIsAsked) {
   EXPECT_THAT(set.kept, ElementsAre(1));
 }
 
+// A ramp that winds up three times, 2.9 m each: what is seen on one turn is seen on the next.
+class Helix {
+ public:
+  static constexpr std::size_t kTurn = 30;  // scans
+
+  Helix() {
+    const Matrix6d information = Vector6d(Vector6d::Constant(1.0 / (0.006 * 0.006))).asDiagonal();
+    for (std::size_t k = 0; k < 3 * kTurn; ++k) {
+      const double angle = 2.0 * std::numbers::pi * static_cast<double>(k) / kTurn;
+      poses.push_back(Step(0.0, 15.0 * std::cos(angle), 15.0 * std::sin(angle), 2.9 * k / kTurn) *
+                      Step(angle, 0.0, 0.0, 0.0));
+      if (k > 0) edges.push_back({k - 1, k, information});
+    }
+  }
+
+  // From `first` to a turn later, said to be `up_m` below where the graph has it.
+  Closure OverATurn(std::size_t first, double up_m) const {
+    const Pose T_map_j = Step(0.0, 0.0, 0.0, -up_m) * poses[first + kTurn];
+    return {first, first + kTurn, poses[first].inverse() * T_map_j, 0.05, 0.005};
+  }
+
+  std::size_t Kept(const std::vector<Closure>& closures) const {
+    const auto set = ConsistentClosures(poses, edges, closures);
+    return set.ok() ? set->kept.size() : 99;
+  }
+
+  std::vector<Pose> poses;
+  std::vector<GraphEdge> edges;
+};
+
+TEST(ClosureConsistencyTest, ATurnOfARampIsNotTheNextOne) {
+  const Helix helix;
+  const auto all_off_by = [&](double up_m) {
+    std::vector<Closure> closures;
+    for (std::size_t k = 30; k < 45; ++k) closures.push_back(helix.OverATurn(k, up_m));
+    return helix.Kept(closures);
+  };
+  EXPECT_EQ(all_off_by(2.9), 0U);
+  EXPECT_EQ(all_off_by(-2.9), 0U);
+  EXPECT_EQ(all_off_by(1.0), 15U) << "drift";
+}
+
+// Whose graph would allow for it by its σ.
+TEST(ClosureConsistencyTest, AStoreyIsNotTheNextOneWhereTheGraphErrsByLittleElsewhere) {
+  Helix helix;
+  for (GraphEdge& edge : helix.edges) edge.information *= 0.1;
+  std::vector<Closure> closures;
+  for (std::size_t k = 30; k < 45; ++k) closures.push_back(helix.OverATurn(k, 2.9));
+  EXPECT_EQ(helix.Kept(closures), 15U) << "nothing says how well the graph is known";
+  for (std::size_t k = 0; k < 7; ++k) closures.push_back(helix.OverATurn(k, 0.02));
+  EXPECT_EQ(helix.Kept(closures), 22U) << "too few do";
+  closures.push_back(helix.OverATurn(7, 0.02));
+  EXPECT_EQ(helix.Kept(closures), 8U);
+}
+
 TEST(ClosureConsistencyTest, HoldsWherePosesAreNear) {
   const Pose T_map_i = Step(1.0, 30.0, -4.0, 2.0);
   const Pose T_i_j = Step(0.5, 3.0, 1.0, 0.0);
