@@ -250,7 +250,9 @@ class Alignment {
     const std::size_t nodes = graph.T_map_scan.size();
     std::vector<bool> known(nodes, false);
     std::vector<Matrix6d> information(nodes, Matrix6d::Zero());
+    const std::vector<bool> out_of_line = OutOfLine();
     for (std::size_t node = 0; node < nodes; ++node) {
+      if (out_of_line[node]) continue;
       for (const ScanMatch& match : matches_.of(node)) {
         for (const auto& [i, T_i_scan] : match.T_i_scan) {
           graph.relative.push_back({i, node, T_i_scan, match.Share(), match.chain.may_be_false});
@@ -271,8 +273,11 @@ class Alignment {
       }
     }
     measured_end_ = graph.relative.size();
+    for (std::size_t node = 0; node < nodes; ++node) {
+      if (out_of_line[node]) graph.relative.push_back(*odometry_[node]);
+    }
     for (const ScanPair& pair : problem_.pairs) {
-      if (known[pair.j] || pair.may_be_false) continue;
+      if (known[pair.j] || pair.may_be_false || out_of_line[pair.j]) continue;
       graph.relative.push_back(
           {pair.i,
            pair.j,
@@ -281,6 +286,37 @@ class Alignment {
     }
     AddOdometry(known, information, graph);
     return graph;
+  }
+
+  // Of every node: it was looked for in vain when it came in, matches now far from where its robot
+  // says, and the scans before and after it agree with the robot: nothing speaks for the match.
+  std::vector<bool> OutOfLine() const {
+    std::vector<bool> out_of_line(result_.T_map_scan.size(), false);
+    if (problem_.lost.empty()) return out_of_line;
+    for (const std::vector<std::size_t>& way : ways_) {
+      const std::optional<OdometryNoise> noise = NoiseOf(way);
+      for (std::size_t k = 1; noise.has_value() && k + 1 < way.size(); ++k) {
+        const RelativePoseTerm* const to = odometry_[way[k]];
+        const RelativePoseTerm* const from = odometry_[way[k + 1]];
+        const std::optional<Pose> matched = MatchedPose(way[k]);
+        if (!lost_[way[k]] || !matched.has_value() || to == nullptr || from == nullptr) continue;
+        const Pose T_before_map = pose(way[k - 1]).inverse();
+        const Pose T_before_after = to->T_i_j * from->T_i_j;
+        out_of_line[way[k]] =
+            IsJump(to->T_i_j.inverse() * T_before_map * *matched, *noise) &&
+            !IsJump(T_before_after.inverse() * T_before_map * pose(way[k + 1]), *noise);
+      }
+    }
+    return out_of_line;
+  }
+
+  // Where the match to what is behind it has a scan; nullopt: none.
+  std::optional<Pose> MatchedPose(std::size_t node) const {
+    for (const ScanMatch& match : matches_.of(node)) {
+      if (!match.good || !match.chain.own) continue;
+      return pose(match.T_i_scan[0].first) * match.T_i_scan[0].second;
+    }
+    return std::nullopt;
   }
 
   // What robots say of their motion: as good as it has proved to be, or where that is not known in

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -371,11 +372,13 @@ class LongWay final : public AlignmentSource {
     return along <= kEnd ? along : 2 * kEnd - along;
   }
   absl::StatusOr<std::shared_ptr<const ScanFeatures>> Features(std::size_t node) override {
-    return yard_.Features(At(node));
+    return yard_.Features(node == elsewhere ? At(node + 1) : At(node));
   }
   absl::StatusOr<std::shared_ptr<const ScanPlanes>> Planes(std::size_t node) override {
-    return yard_.Planes(At(node));
+    return yard_.Planes(node == elsewhere ? At(node + 1) : At(node));
   }
+
+  std::optional<std::size_t> elsewhere;  // the scan that shows what the next one shows
 
  private:
   YardScans& yard_;
@@ -402,6 +405,39 @@ TEST_F(AlignmentTest, AJumpOfOdometryPullsNothing) {
   for (std::size_t k = 0; k < LongWay::kScans; ++k) {
     const Pose& truth = yard().truth()[LongWay::At(k)];
     EXPECT_LT((result.T_map_scan[k].translation() - truth.translation()).norm(), 0.02) << k;
+  }
+}
+
+// A scan of a bare floor that ingest could not place was drawn 1.1 m along a drawn car park,
+// between two that were where their robot says.
+TEST_F(AlignmentTest, ALostScanOutOfLineIsWhereItsRobotSays) {
+  constexpr std::size_t kLost = 22;
+  LongWay way(yard());
+  way.elsewhere = kLost;
+  RandomPoses random(20261130);
+  problem_ = {};
+  problem_.trajectories.resize(1);
+  problem_.lost = {kLost};
+  for (std::size_t k = 0; k < LongWay::kScans; ++k) {
+    problem_.T_map_scan.push_back(yard().truth()[LongWay::At(k)]);
+    problem_.trajectories[0].push_back(k);
+    if (k == 0) continue;
+    const std::size_t before = k == kLost + 1 ? kLost - 1 : k - 1;
+    ScanPair& pair = problem_.pairs.emplace_back(ScanPair{before, k});
+    if (k != kLost) {
+      pair.measured = MeasuredPose{TrueStep(LongWay::At(before), LongWay::At(k)),
+                                   IsotropicInformation(0.001, 0.01)};
+    }
+    RelativePoseTerm motion{k - 1, k};
+    motion.T_i_j = Retract(TrueStep(LongWay::At(k - 1), LongWay::At(k)), random.Step(0.001, 0.01));
+    problem_.odometry.push_back(motion);
+  }
+  problem_.T_map_scan[kLost] = yard().truth()[LongWay::At(kLost + 1)];
+  STRATA_ASSERT_OK_AND_ASSIGN(const AlignmentResult result, Align(way));
+  for (std::size_t k = 0; k < LongWay::kScans; ++k) {
+    const Pose& truth = yard().truth()[LongWay::At(k)];
+    EXPECT_LT((result.T_map_scan[k].translation() - truth.translation()).norm(), 0.05) << k;
+    EXPECT_EQ(result.parts[k] == result.parts[0], k != kLost) << k;
   }
 }
 
