@@ -289,7 +289,7 @@ class Alignment {
   }
 
   // Of every node: it was looked for in vain when it came in, matches now far from where its robot
-  // says, and the scans before and after it agree with the robot: nothing speaks for the match.
+  // says, and the scans before and after it agree with the robot: no match of it counts.
   std::vector<bool> OutOfLine() const {
     std::vector<bool> out_of_line(result_.T_map_scan.size(), false);
     if (problem_.lost.empty()) return out_of_line;
