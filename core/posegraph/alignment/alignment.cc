@@ -477,7 +477,14 @@ absl::StatusOr<AlignmentResult> AlignScans(const AlignmentProblem& problem,
                                            AlignmentProgress progress,
                                            const Stop& stop) {
   STRATA_RETURN_IF_ERROR(CheckProblem(problem));
-  return Alignment(problem, source, options, for_each, stop).Run(progress);
+  const Eigen::Vector3d middle = FarMiddle(problem);
+  if (middle.isZero(0.0)) return Alignment(problem, source, options, for_each, stop).Run(progress);
+  AlignmentProblem near = problem;
+  MoveZero(middle, near);
+  STRATA_ASSIGN_OR_RETURN(AlignmentResult result,
+                          Alignment(near, source, options, for_each, stop).Run(progress));
+  MoveZero(-middle, result);
+  return result;
 }
 
 }  // namespace strata

@@ -11,6 +11,13 @@
 #include "core/registration/neighbours.h"
 
 namespace strata {
+namespace {
+
+void MoveZero(const Eigen::Vector3d& zero, Plane& plane) {
+  plane.distance -= plane.normal.dot(zero);
+}
+
+}  // namespace
 
 absl::Status CheckProblem(const AlignmentProblem& problem) {
   const std::size_t nodes = problem.T_map_scan.size();
@@ -47,6 +54,25 @@ absl::Status CheckProblem(const AlignmentProblem& problem) {
     return absl::InvalidArgumentError("trajectories: a node is in none");
   }
   return absl::OkStatus();
+}
+
+Eigen::Vector3d FarMiddle(const AlignmentProblem& problem) {
+  constexpr double kStepM = 1024.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Pose& T_map_scan : problem.T_map_scan) sum += T_map_scan.translation();
+  const double scans = std::max(1.0, static_cast<double>(problem.T_map_scan.size()));
+  return kStepM * (sum / (kStepM * scans)).array().round().matrix();
+}
+
+void MoveZero(const Eigen::Vector3d& zero, AlignmentProblem& problem) {
+  for (Pose& T_map_scan : problem.T_map_scan) T_map_scan.translation() -= zero;
+  for (PriorTerm& prior : problem.priors) prior.T_map_scan.translation() -= zero;
+  for (ExcludedPlane& excluded : problem.excluded_planes) MoveZero(zero, excluded.plane_map);
+}
+
+void MoveZero(const Eigen::Vector3d& zero, AlignmentResult& result) {
+  for (Pose& T_map_scan : result.T_map_scan) T_map_scan.translation() -= zero;
+  for (SharedPlane& shared : result.planes) MoveZero(zero, shared.plane);
 }
 
 void CutBefore(const std::vector<bool>& cut, AlignmentProblem& problem) {

@@ -7,6 +7,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "core/geometry/primitives.h"
+
 namespace strata {
 namespace {
 
@@ -38,14 +40,17 @@ double Disagreement(const SharedPlane& plane, const std::vector<Pose>& T_map_sca
 
 }  // namespace
 
-bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded) {
+bool IsExcluded(const SharedPlane& found,
+                const ExcludedPlane& excluded,
+                const std::vector<Pose>& T_map_scan) {
   constexpr double kSameCosine = 0.9986;
   constexpr double kSameDistanceM = 0.2;
   if (found.plane.normal.dot(excluded.plane_map.normal) < kSameCosine) return false;
-  if (std::abs(found.plane.distance - excluded.plane_map.distance) > kSameDistanceM) return false;
   return std::any_of(found.views.begin(), found.views.end(), [&](const SharedPlane::View& view) {
-    return std::find(excluded.nodes.begin(), excluded.nodes.end(), view.scan) !=
-           excluded.nodes.end();
+    if (std::ranges::find(excluded.nodes, view.scan) == excluded.nodes.end()) return false;
+    // Where it was seen: far from there planes of one tilt or another are anywhere.
+    const Eigen::Vector3d p_scan = view.moments.topRightCorner<3, 1>() / view.moments(3, 3);
+    return Distance(T_map_scan[view.scan] * p_scan, excluded.plane_map) <= kSameDistanceM;
   });
 }
 

@@ -14,8 +14,11 @@
 
 namespace strata {
 
-// Whether `found` is what was excluded: the same plane to 3° and 0.2 m, and a scan in common.
-bool IsExcluded(const SharedPlane& found, const ExcludedPlane& excluded);
+// Whether `found` is what was excluded: the same plane to 3°, and to 0.2 m where a scan that they
+// have in common sees it.
+bool IsExcluded(const SharedPlane& found,
+                const ExcludedPlane& excluded,
+                const std::vector<Pose>& T_map_scan);
 
 // The term of a direction, each view as much as it agrees with the others.
 DirectionTerm TermOf(const SharedDirection& direction, const std::vector<Pose>& T_map_scan);

@@ -40,7 +40,11 @@ absl::Status SharedSurfaces::Find(const std::vector<Pose>& T_map_scan, ForEach f
   stays_ = false;
   planes_ = FindSharedPlanes(posed, gates_);
   if (options_.directions) directions_ = FindSharedDirections(posed, gates_);
-  std::erase_if(planes_, [this](const SharedPlane& plane) { return IsExcluded(plane); });
+  std::erase_if(planes_, [&](const SharedPlane& plane) {
+    return std::ranges::any_of(problem_.excluded_planes, [&](const ExcludedPlane& excluded) {
+      return IsExcluded(plane, excluded, T_map_scan);
+    });
+  });
   return absl::OkStatus();
 }
 
@@ -105,12 +109,6 @@ SharedPlaneOptions SharedSurfaces::GatesOfNow() const {
   gates.pose_sigma_rad =
       std::min(gates.pose_sigma_rad, std::max(finest.pose_sigma_rad, last_->turn_rad));
   return gates;
-}
-
-bool SharedSurfaces::IsExcluded(const SharedPlane& plane) const {
-  return std::ranges::any_of(problem_.excluded_planes, [&plane](const ExcludedPlane& excluded) {
-    return strata::IsExcluded(plane, excluded);
-  });
 }
 
 }  // namespace strata

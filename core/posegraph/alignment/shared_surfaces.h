@@ -52,7 +52,6 @@ class SharedSurfaces {
   // So many σ of what the search allowed for.
   bool IsWithin(const Motion& motion, double sigmas) const;
   SharedPlaneOptions GatesOfNow() const;
-  bool IsExcluded(const SharedPlane& plane) const;
 
   const AlignmentProblem& problem_;
   AlignmentSource& source_;

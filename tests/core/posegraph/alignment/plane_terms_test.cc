@@ -29,6 +29,20 @@ std::vector<std::size_t> ScansOf(const SharedPlane& plane) {
   return scans;
 }
 
+// Far from the map's zero a plane that is turned by a degree passes it metres away.
+TEST(IsExcludedTest, WhereItWasSeenItIsTheSamePlane) {
+  SharedPlane found = SeenBy({1});
+  const Eigen::Vector4d p(2.0, 1.0, 0.0, 1.0);
+  found.views[0].moments = 3.0 * p * p.transpose();
+  const std::vector<Pose> poses(2, Pose(Eigen::Translation3d(200.0, 0.0, 5.0)));
+  found.plane = {Eigen::Vector3d(0.02, 0.0, 1.0).normalized(), 0.0};
+  found.plane.distance = found.plane.normal.dot(poses[1] * p.head<3>());
+  EXPECT_TRUE(IsExcluded(found, {{Eigen::Vector3d::UnitZ(), 5.1}, {1}}, poses));
+  EXPECT_FALSE(IsExcluded(found, {{Eigen::Vector3d::UnitZ(), 5.3}, {1}}, poses));
+  EXPECT_FALSE(IsExcluded(found, {{Eigen::Vector3d::UnitZ(), 5.1}, {0}}, poses));
+  EXPECT_FALSE(IsExcluded(found, {{-Eigen::Vector3d::UnitZ(), -5.1}, {1}}, poses));
+}
+
 TEST(SplitByPartTest, EachPartHasItsOwnPlane) {
   const std::vector<SharedPlane> split =
       SplitByPart({SeenBy({0, 1, 2, 3, 4}), SeenBy({1, 3})}, {0, 0, 2, 0, 2});
