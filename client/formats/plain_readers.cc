@@ -122,6 +122,9 @@ class ColumnText {
     if (comment) {
       line.remove_prefix(std::min(line.find_first_not_of("#/"), line.size()));
     }
+    if (!comment && absl::StrContains(line, ';') && absl::StrContains(line, ',')) {
+      return cursor_.Error("';' and ',' on one line; write decimals with points: 1.25;2.5;0.75");
+    }
     const std::vector<absl::string_view> words = SplitWords(line, true);
     if (words.empty()) return absl::OkStatus();
     if (comment) {

@@ -145,6 +145,15 @@ absl::StatusOr<PoseList> Parse(absl::string_view text, PoseFormat asked) {
 
 }  // namespace
 
+absl::StatusOr<Pose> ParseKittiPose(const TextCursor& cursor,
+                                    const std::vector<absl::string_view>& twelve) {
+  if (twelve.size() != 12) {
+    return cursor.Error(absl::StrCat("expected 12 numbers, found ", twelve.size()));
+  }
+  STRATA_ASSIGN_OR_RETURN(const std::vector<double> numbers, LineNumbers(cursor, twelve));
+  return PoseOfMatrix(cursor, numbers.data());
+}
+
 absl::StatusOr<PoseFormat> ParsePoseFormat(absl::string_view name) {
   for (const NamedFormat& named : kFormats) {
     if (named.name == name) return named.format;

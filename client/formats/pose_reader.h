@@ -11,6 +11,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/time/time.h"
 
+#include "client/formats/parsing/text_cursor.h"
 #include "core/geometry/pose.h"
 
 namespace strata {
@@ -40,6 +41,11 @@ struct PoseList {
 // INVALID_ARGUMENT with file, line and what was expected, also for an index that comes twice.
 absl::StatusOr<PoseList> ReadPoses(const std::filesystem::path& path,
                                    PoseFormat format = PoseFormat::kAuto);
+
+// The pose that twelve words of the line where `cursor` is are: rows of [R t]. INVALID_ARGUMENT
+// naming that line.
+absl::StatusOr<Pose> ParseKittiPose(const TextCursor& cursor,
+                                    const std::vector<absl::string_view>& twelve);
 
 // The pose beside a 3DTK scan: scan000.3d has scan000.pose. See Parse3dtkPose for the frame.
 absl::StatusOr<Pose> Read3dtkPoseOf(const std::filesystem::path& scan);

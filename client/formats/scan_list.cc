@@ -19,11 +19,15 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "absl/time/time.h"
 
+#include "client/formats/camera_poses.h"
 #include "client/formats/parsing/range_zero.h"
 #include "client/formats/parsing/text_cursor.h"
 #include "client/formats/pcd_reader.h"
@@ -67,6 +71,64 @@ bool NaturalLess(absl::string_view a, absl::string_view b) {
   return a < b;
 }
 
+// The run of digits that `text` ends with, which is taken off; empty where it ends with none.
+absl::string_view TakeDigits(absl::string_view& text) {
+  std::size_t begin = text.size();
+  while (begin > 0 && absl::ascii_isdigit(text[begin - 1])) --begin;
+  const absl::string_view digits = text.substr(begin);
+  text.remove_suffix(digits.size());
+  return digits;
+}
+
+// Of ten digits, seconds since 1970 are those of 2001 to 2286: what else has as many.
+constexpr std::size_t kDigitsOfSeconds = 10;
+
+// The moment that a name ends with, in decimals: seconds and a fraction of them behind a point or,
+// of six or nine digits, an underscore; or whole milli-, micro- or nanoseconds.
+std::optional<absl::Time> StampAtEndOf(absl::string_view stem) {
+  const absl::string_view last = TakeDigits(stem);
+  absl::string_view seconds = last.substr(0, kDigitsOfSeconds);
+  absl::string_view fraction = last.substr(seconds.size());
+  const bool is_after_point = absl::ConsumeSuffix(&stem, ".");
+  if (is_after_point ||
+      ((last.size() == 6 || last.size() == 9) && absl::ConsumeSuffix(&stem, "_"))) {
+    seconds = TakeDigits(stem);
+    fraction = last;
+  } else if (fraction.size() != 3 && fraction.size() != 6 && fraction.size() != 9) {
+    return std::nullopt;
+  }
+  if (seconds.size() != kDigitsOfSeconds || seconds[0] == '0' || fraction.empty()) {
+    return std::nullopt;
+  }
+  std::int64_t whole_s = 0, billionths = 0;
+  const std::string nanoseconds = absl::StrCat(fraction.substr(0, 9), std::string(9, '0'));
+  if (!absl::SimpleAtoi(seconds, &whole_s) ||
+      !absl::SimpleAtoi(nanoseconds.substr(0, 9), &billionths)) {
+    return std::nullopt;
+  }
+  return absl::FromUnixSeconds(whole_s) + absl::Nanoseconds(billionths);
+}
+
+// Whether the numbers that names end with are those of the scans: each another, and growing with
+// what stands before them. Nanoseconds behind seconds are not.
+bool AreNumbered(const std::vector<fs::path>& natural) {
+  std::set<std::uint64_t> seen;
+  bool grows = true;
+  std::set<std::string> digits_before;
+  for (const fs::path& file : natural) {
+    const std::optional<std::uint64_t> sequence = SequenceOfName(file);
+    if (!sequence.has_value()) return false;
+    grows = grows && (seen.empty() || *seen.rbegin() < *sequence);
+    if (!seen.insert(*sequence).second) return false;
+    std::string before = file.stem().string();
+    while (!absl::ascii_isdigit(before.back())) before.pop_back();
+    while (!before.empty() && absl::ascii_isdigit(before.back())) before.pop_back();
+    std::erase_if(before, [](char c) { return !absl::ascii_isdigit(c); });
+    digits_before.insert(before);
+  }
+  return grows || digits_before.size() == 1;
+}
+
 std::vector<ScanFile> Ordered(std::vector<fs::path> files, ScanFormat format) {
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
     return NaturalLess(a.string(), b.string());
@@ -80,12 +142,7 @@ std::vector<ScanFile> Ordered(std::vector<fs::path> files, ScanFormat format) {
       return *TimeOfName(a) < *TimeOfName(b);
     });
   }
-  std::set<std::uint64_t> seen;
-  const bool numbered =
-      !timed && std::all_of(files.begin(), files.end(), [&seen](const auto& file) {
-        const std::optional<std::uint64_t> sequence = SequenceOfName(file);
-        return sequence.has_value() && seen.insert(*sequence).second;
-      });
+  const bool numbered = !timed && AreNumbered(files);
   std::vector<ScanFile> scans;
   for (const fs::path& file : files) {
     ScanFile& scan = scans.emplace_back();
@@ -324,8 +381,34 @@ absl::StatusOr<fs::path> ChoosePoses(const std::vector<fs::path>& paths,
       "several files of poses: ", Joined(files), "; choose one of them with --poses FILE"));
 }
 
+// Poses of a camera become those of the lidar that took the scans, where a calib.txt with the
+// scans, above them or with the poses says how they are to each other.
+absl::Status TakeFromCamera(const ScanListOptions& options,
+                            const std::vector<ScanFile>& scans,
+                            std::vector<FilePose>& poses) {
+  if (scans.empty() || !MoveAsCameras(poses)) return absl::OkStatus();
+  std::error_code error;
+  const fs::path folder = fs::absolute(scans.front().path, error).parent_path();
+  const fs::path beside = fs::absolute(options.poses, error).parent_path();
+  STRATA_ASSIGN_OR_RETURN(const std::optional<Pose> T_camera_lidar,
+                          LidarInCamera({folder, folder.parent_path(), beside}));
+  if (T_camera_lidar.has_value()) poses = PosesOfLidar(std::move(poses), *T_camera_lidar);
+  if (!options.tell) return absl::OkStatus();
+  options.tell(absl::StrCat(
+      T_camera_lidar.has_value() ? "" : "warning: ",
+      options.poses.string(),
+      " are poses of a camera, which looks along z; ",
+      T_camera_lidar.has_value()
+          ? "taken to the lidar by the Tr of calib.txt"
+          : "the map will lie on its side, unless the Tr of KITTI's calib.txt is beside them"));
+  return absl::OkStatus();
+}
+
 absl::Status AssignFromFile(const ScanListOptions& options, std::vector<ScanFile>& scans) {
   STRATA_ASSIGN_OR_RETURN(PoseList list, ReadPoses(options.poses, options.pose_format));
+  if (list.format == PoseFormat::kKitti) {
+    STRATA_RETURN_IF_ERROR(TakeFromCamera(options, scans, list.poses));
+  }
   if (list.format == PoseFormat::kTum) {
     AssignTum(std::move(list), options, scans);
   } else {
@@ -350,6 +433,7 @@ std::optional<std::uint64_t> SequenceOfName(const fs::path& path) {
 
 std::optional<absl::Time> TimeOfName(const fs::path& path) {
   const std::string stem = path.stem().string();
+  if (const std::optional<absl::Time> stamp = StampAtEndOf(stem)) return stamp;
   const std::optional<double> seconds = ParseNumber(stem);
   if (!absl::StrContains(stem, ".") || !seconds.has_value()) return std::nullopt;
   if (!(*seconds >= 0.0 && *seconds < 9e12)) return std::nullopt;

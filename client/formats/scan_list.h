@@ -60,25 +60,29 @@ absl::StatusOr<PointCloud> ReadScanFile(const ScanFile& scan, std::size_t* at_se
 // or beyond 2^53.
 std::optional<std::uint64_t> SequenceOfName(const std::filesystem::path& path);
 
-// The time [s since 1970] that the stem of a file's name is, with a decimal point
-// ("1432235498.028276.pcd"); nullopt for other names.
+// The time that the stem of a file's name is: seconds since 1970 with a decimal point
+// ("1432235498.028276.pcd"); or that it ends with, where those have ten digits: with a point, or as
+// seconds_nanoseconds ("cloud_1583836591_200000048.pcd"; six digits: microseconds), or in whole
+// milli-, micro- or nanoseconds ("1583836591200000048.bin"). nullopt for other names.
 std::optional<absl::Time> TimeOfName(const std::filesystem::path& path);
 
 // Scans of `paths`, each as ScansAt() has it, in the order of their sequence numbers.
 //
-// The sequence number is SequenceOfName where every file has one and no two are equal; else the
-// files are numbered from 0 in natural order of their names (s2 before s10). Files whose names are
-// all times are numbered in the order of those: the last digits of a time say nothing.
+// The sequence number is SequenceOfName where every file has one, no two are equal, and they grow
+// with the digits before them, if those differ ("a12_3.pcd"); else the files are numbered from 0 in
+// natural order of their names (s2 before s10). Files whose names are all times are numbered in the
+// order of those: the last digits of a time say nothing.
 //
 // A file that holds several scans (HoldsStations) gives each of them, its path with ":0", ":1", …
 // behind it; then all scans are numbered from 0 in that order. Their poses are those in the file,
 // if it has any (StationsHavePoses): then a file of poses can be named only for files of one scan
 // each. Else their numbers and times say whose a pose is.
 //
-// Poses: index-tum and kitti by index = SequenceOfName. tum has no index: where every stem is a
-// time in seconds (it has a decimal point) by time, to a millisecond; else one after the other, the
-// scans in order and the poses in order of time; `tell` is told where the file has more poses.
-// 3dtk: the .pose file beside each scan or in the folder named.
+// Poses: index-tum and kitti by index = SequenceOfName; kitti's of a camera are taken to the lidar
+// where a calib.txt says how (LidarInCamera), else `tell` is warned. tum has no index: where every
+// name is a time (TimeOfName) by that, to a millisecond; else one after the other, the scans in
+// order and the poses in order of time; `tell` is told where the file has more poses. 3dtk: the
+// .pose file beside each scan or in the folder named.
 //
 // Where none are named: those beside 3DTK scans; else the one file of poses (PoseFilesIn) in the
 // folder that is named; else none for a single scan, for LAS files, for files with poses of

@@ -193,7 +193,8 @@ void AddScanImport(Commands& commands, CLI::App* noun) {
           "--pose-format",
           options->pose_format,
           "tum: time x y z qx qy qz qw; index-tum: index before that, the last number in a "
-          "file's name; kitti: 12 numbers, line 0 for index 0; 3dtk: .pose files")
+          "file's name; kitti: 12 numbers, line 0 for index 0, a camera's taken to the lidar "
+          "by the Tr of calib.txt; 3dtk: .pose files")
       ->check(CLI::IsMember({"auto", "tum", "index-tum", "kitti", "3dtk"}))
       ->capture_default_str();
   import->add_option("--trajectory",

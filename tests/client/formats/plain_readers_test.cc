@@ -33,6 +33,14 @@ TEST(XyzReaderTest, ColumnsWithoutNamesGoByTheirNumber) {
   EXPECT_THAT(xyzirgb.colour, ElementsAre(Colour{10, 20, 30}));
 }
 
+// "1,2345;-6,7890;0,5000" was a point 2.3 km away, with a colour.
+TEST(XyzReaderTest, DecimalCommasAreRefused) {
+  EXPECT_THAT(ReadXyz("1,2345;-6,7890;0,5000\n"),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("line 1"), HasSubstr("decimals with points"))));
+  STRATA_EXPECT_OK(ReadXyz("# metres; from a, not b\n1.5;2;3\n"));
+}
+
 TEST(XyzReaderTest, NamesComeFromALineOrAComment) {
   STRATA_ASSERT_OK_AND_ASSIGN(const PointCloud csv, ReadXyz("time,z,x,y,nx\n0,3,1,2,9\n"));
   EXPECT_THAT(csv.points, ElementsAre(Eigen::Vector3f(1, 2, 3)));

@@ -124,6 +124,85 @@ TEST_F(ScanListTest, TumPosesGoByTimeWhereNamesAreTimes) {
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("1305031109.5")));
 }
 
+// Their last digits were taken for the scans' numbers: poses went to others.
+TEST_F(ScanListTest, NamesMayEndWithTimes) {
+  const auto poses = Write("poses",
+                           "1583836591.200000048 10 0 0 0 0 0 1\n"
+                           "1583836592.100000000 20 0 0 0 0 0 1\n");
+  const std::vector<std::pair<std::string, std::string>> names = {
+      {"cloud_1583836591.200000.xyz", "cloud_1583836592.100000.xyz"},
+      {"cloud_1583836591_200000048.xyz", "cloud_1583836592_100000000.xyz"},
+      {"1583836591_200000.xyz", "1583836592_100000.xyz"},
+      {"1583836591200000048.xyz", "1583836592100000000.xyz"},
+      {"lidar-1583836591200000.xyz", "lidar-1583836592100000.xyz"},
+      {"1583836591200.xyz", "1583836592100.xyz"}};
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const std::string folder = "times" + std::to_string(k) + "/";
+    Write(folder + names[k].second);
+    Write(folder + names[k].first);
+    STRATA_ASSERT_OK_AND_ASSIGN(const auto scans,
+                                ListScans({dir_.path() / folder}, {.poses = poses}));
+    EXPECT_THAT(Names(scans), ElementsAre(names[k].first, names[k].second));
+    EXPECT_THAT(Sequences(scans), ElementsAre(0, 1)) << folder;
+    EXPECT_EQ(scans[0].T_map_scan.translation().x(), 10) << folder;
+    EXPECT_EQ(scans[1].T_map_scan.translation().x(), 20) << folder;
+  }
+  for (const char* none : {"scan_12", "scan012_345678", "0123456789_123456", "12345678901.5x"}) {
+    EXPECT_EQ(TimeOfName(std::string(none) + ".pcd"), std::nullopt) << none;
+  }
+}
+
+// Nanoseconds without their zeros are no numbers of scans, and no fractions.
+TEST_F(ScanListTest, NumbersThatDoNotGrowWithTheDigitsBeforeThemAreNone) {
+  for (const char* name : {"a17_90.xyz", "a18_5.xyz", "a19_61.xyz"}) Write(name);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, ListScans({dir_.path()}, {.poses = kNoPoses}));
+  EXPECT_THAT(Names(scans), ElementsAre("a17_90.xyz", "a18_5.xyz", "a19_61.xyz"));
+  EXPECT_THAT(Sequences(scans), ElementsAre(0, 1, 2));
+}
+
+// A camera looks along z and has y down: maps of KITTI's own poses lay on their side.
+TEST_F(ScanListTest, PosesOfACameraBecomeThoseOfTheLidar) {
+  const auto poses = Write("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 2\n");
+  Write("drive/velodyne/000000.xyz");
+  Write("drive/velodyne/000001.xyz");
+  std::vector<std::string> told;
+  const auto list = [&] {
+    ScanListOptions options{.poses = poses};
+    options.tell = [&](const std::string& line) { told.push_back(line); };
+    return ListScans({dir_.path() / "drive/velodyne"}, options);
+  };
+  STRATA_ASSERT_OK(list());
+  EXPECT_THAT(told, ElementsAre(AllOf(HasSubstr("warning"), HasSubstr("calib.txt"))));
+  Write("drive/calib.txt", "P0: 1 2 3\nTr: 0 -1 0 0.1 0 0 -1 0.2 1 0 0 0.3\n");
+  told.clear();
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto scans, list());
+  EXPECT_THAT(told, ElementsAre(HasSubstr("taken to the lidar")));
+  EXPECT_TRUE(scans[0].T_map_scan.isApprox(Pose::Identity(), 1e-9));
+  EXPECT_TRUE(scans[1].T_map_scan.isApprox(Pose(Eigen::Translation3d(2, 0, 0)), 1e-9));
+  Write("drive/calib.txt", "Tr: 0 -1 0 0.1\n");
+  EXPECT_THAT(list(),
+              StatusIs(absl::StatusCode::kInvalidArgument,
+                       AllOf(HasSubstr("calib.txt"), HasSubstr("12 numbers"))));
+}
+
+// What KITTI published and what was converted of it by hand.
+TEST_F(ScanListTest, RecordedPosesOfACameraBecomeThoseOfTheLidar) {
+  STRATA_REQUIRE_DATA(folder, "kitti00_gt");
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto of_camera,
+      ListScans({folder / "velodyne"}, {.poses = folder / "poses_00_cam0.txt"}));
+  STRATA_ASSERT_OK_AND_ASSIGN(
+      const auto of_lidar,
+      ListScans({folder / "velodyne"}, {.poses = folder / "poses_00_velo.txt"}));
+  ASSERT_EQ(of_camera.size(), of_lidar.size());
+  for (std::size_t k = 0; k < of_camera.size(); ++k) {
+    STRATA_ASSERT_OK(of_camera[k].pose_status);
+    const Pose off = of_lidar[k].T_map_scan.inverse() * of_camera[k].T_map_scan;
+    EXPECT_LT(off.translation().norm(), 0.002) << k;
+    EXPECT_LT(RotationAngleRad(off), 1e-4) << k;
+  }
+}
+
 TEST_F(ScanListTest, PosesBeside3dtkScansAreTakenByThemselves) {
   Write("scan000.3d");
   Write("scan000.pose", "100 0 0 0 0 0\n");
