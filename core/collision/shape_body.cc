@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -32,10 +33,50 @@ constexpr std::size_t kMostEntries = std::size_t{1} << 20;
 // Points asked for are moved by as much, so that no ray runs along an edge of a grid [m].
 constexpr double kAside = 1.37e-7;
 
+using Triangle = std::array<Vector3d, 3>;
+
+// In the shape's frame.
+struct SolidBox {
+  Vector3d centre;
+  Eigen::Matrix3d axes;  // columns
+  Vector3d half;         // its sizes
+};
+
 struct Part {
   std::shared_ptr<fcl::CollisionGeometryd> geometry;
   fcl::Transform3d T_shape_part = fcl::Transform3d::Identity();
 };
+
+// How far one must move along the axis to leave the other.
+double OverlapAlong(const Vector3d& axis, const Triangle& triangle, const SolidBox& box) {
+  double low = axis.dot(triangle[0] - box.centre), high = low;
+  for (const Vector3d& corner : triangle) {
+    low = std::min(low, axis.dot(corner - box.centre));
+    high = std::max(high, axis.dot(corner - box.centre));
+  }
+  const double reach = (box.axes.transpose() * axis).cwiseAbs().dot(box.half);
+  return std::max(0.0, std::min(high + reach, reach - low));
+}
+
+// The least way that parts the two, which touch: along one of the axes that can (Gottschalk et al.,
+// "OBBTree", 1996). The library's depth of such contacts is longer than the solids are.
+double DepthOf(const Triangle& triangle, const SolidBox& box) {
+  const std::array<Vector3d, 3> edges = {
+      triangle[1] - triangle[0], triangle[2] - triangle[1], triangle[0] - triangle[2]};
+  double depth = std::numeric_limits<double>::infinity();
+  const auto along = [&](const Vector3d& axis) {
+    constexpr double kNone = 1e-9;  // of edges that are parallel
+    if (axis.norm() > kNone) {
+      depth = std::min(depth, OverlapAlong(axis.normalized(), triangle, box));
+    }
+  };
+  along(edges[0].cross(edges[1]));
+  for (int k = 0; k < 3; ++k) {
+    along(box.axes.col(k));
+    for (const Vector3d& edge : edges) along(edge.cross(box.axes.col(k)));
+  }
+  return depth;
+}
 
 std::shared_ptr<Mesh> MeshOf(const CollisionShape& shape) {
   auto mesh = std::make_shared<Mesh>();
@@ -91,11 +132,15 @@ struct ShapeBody::Geometry {
     const double share = (at - mesh_bounds.min()[axis]) / mesh_bounds.sizes()[axis];
     return std::clamp(static_cast<int>(share * column_count), 0, column_count - 1);
   }
+  Triangle TriangleAt(std::intptr_t t) const {
+    const auto& [a, b, c] = shape.triangles[static_cast<std::size_t>(t)];
+    return {shape.vertices[a].cast<double>(),
+            shape.vertices[b].cast<double>(),
+            shape.vertices[c].cast<double>()};
+  }
   AlignedBox3d BoxOf(std::uint32_t triangle) const {
     AlignedBox3d box;
-    for (const std::uint32_t v : shape.triangles[triangle]) {
-      box.extend(shape.vertices[v].cast<double>());
-    }
+    for (const Vector3d& corner : TriangleAt(triangle)) box.extend(corner);
     return box;
   }
   // Of all columns together.
@@ -189,6 +234,7 @@ std::optional<ShapeTouch> ShapeBody::Touches(const Pose& T_map_shape,
   fcl::Transform3d T_shape_box = fcl::Transform3d::Identity();
   T_shape_box.linear() = T_map_shape.linear().transpose();
   T_shape_box.translation() = p_shape;
+  const SolidBox solid_box{p_shape, T_shape_box.linear(), box.sizes() / 2.0};
   std::optional<ShapeTouch> deepest;
   const fcl::CollisionRequestd request(kMostContacts, true);
   for (const Part& part : geometry_->parts) {
@@ -196,7 +242,9 @@ std::optional<ShapeTouch> ShapeBody::Touches(const Pose& T_map_shape,
     fcl::collide(part.geometry.get(), part.T_shape_part, &solid, T_shape_box, request, result);
     for (std::size_t i = 0; i < result.numContacts(); ++i) {
       const fcl::Contactd& contact = result.getContact(i);
-      const double depth = std::abs(contact.penetration_depth);
+      const double depth = part.geometry == geometry_->mesh
+                               ? DepthOf(geometry_->TriangleAt(contact.b1), solid_box)
+                               : std::abs(contact.penetration_depth);
       if (deepest.has_value() && deepest->depth_m >= depth) continue;
       deepest = ShapeTouch{depth, T_map_shape * Vector3d(contact.pos)};
     }

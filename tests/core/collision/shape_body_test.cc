@@ -104,7 +104,11 @@ TEST(ShapeBodyTest, TrianglesTouchBoxesAsTheSeparatingAxesSay) {
     const double gap = GapAlong(corners, CornersOf(box), axes);
     if (std::abs(gap) < kTouching) continue;
     touching += gap < 0.0;
-    EXPECT_EQ(ShapeBody(shape).Touches(T, box).has_value(), gap < 0.0) << i << ": " << gap;
+    const std::optional<ShapeTouch> touch = ShapeBody(shape).Touches(T, box);
+    ASSERT_EQ(touch.has_value(), gap < 0.0) << i << ": " << gap;
+    if (touch.has_value()) {
+      EXPECT_NEAR(touch->depth_m, -gap, 1e-6) << i;
+    }
   }
   EXPECT_GT(touching, 500);
   EXPECT_LT(touching, 9000);

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -43,6 +44,29 @@ std::string Stl() {
   return bytes + std::string(2, '\0');
 }
 
+// The same, with y up.
+std::string Glb() {
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,)"
+      R"("componentType":5126,"count":3,"type":"VEC3","min":[0,0,-2],"max":[1,3,0]}],)"
+      R"("bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string bytes = "glTF";
+  const auto add = [&bytes](std::uint32_t number) {
+    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+  };
+  add(2);
+  add(static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + 36));
+  add(static_cast<std::uint32_t>(json.size()));
+  bytes += "JSON" + json;
+  add(36);
+  bytes.append("BIN\0", 4);
+  const float numbers[9] = {0, 0, 0, 1, 0, 0, 0, 3, -2};
+  bytes.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
+  return bytes;
+}
+
 class ShapeReaderTest : public ::testing::Test {
  protected:
   std::string Write(const std::string& name, const std::string& bytes) {
@@ -69,6 +93,36 @@ TEST_F(ShapeReaderTest, MeshesOfAllKinds) {
     EXPECT_THAT(shape.triangles, SizeIs(triangles)) << name;
     EXPECT_TRUE(BoxOf(shape).min().isZero(1e-6F)) << name;
     EXPECT_TRUE(BoxOf(shape).max().isApprox(Eigen::Vector3f(1, 2, 3), 1e-6F)) << name;
+  }
+}
+
+// Libraries give some files with y up, whatever those say: shapes lay on their side.
+TEST_F(ShapeReaderTest, UpIsUp) {
+  const auto dae = [](const std::string& axis, const std::string& points) {
+    return "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' "
+           "version='1.4.1'><asset><unit meter='1'/><up_axis>" +
+           axis +
+           "</up_axis></asset><library_geometries><geometry id='g'><mesh><source id='p'>"
+           "<float_array id='pa' count='9'>" +
+           points +
+           "</float_array><technique_common><accessor source='#pa' count='3' stride='3'>"
+           "<param name='X' type='float'/><param name='Y' type='float'/>"
+           "<param name='Z' type='float'/></accessor></technique_common></source>"
+           "<vertices id='v'><input semantic='POSITION' source='#p'/></vertices>"
+           "<triangles count='1'><input semantic='VERTEX' source='#v' offset='0'/>"
+           "<p>0 1 2</p></triangles></mesh></geometry></library_geometries>"
+           "<library_visual_scenes><visual_scene id='s'><node><instance_geometry url='#g'/></node>"
+           "</visual_scene></library_visual_scenes><scene><instance_visual_scene url='#s'/></scene>"
+           "</COLLADA>";
+  };
+  for (const auto& [name, bytes] :
+       {std::pair<std::string, std::string>{"z.dae", dae("Z_UP", "0 0 0 1 0 0 0 2 3")},
+        {"y.dae", dae("Y_UP", "0 0 0 1 0 0 0 3 -2")},
+        {"a.glb", Glb()}}) {
+    STRATA_ASSERT_OK_AND_ASSIGN(const CollisionShape shape, ReadShape(Write(name, bytes)));
+    EXPECT_TRUE(BoxOf(shape).min().isZero(1e-6F)) << name;
+    EXPECT_TRUE(BoxOf(shape).max().isApprox(Eigen::Vector3f(1, 2, 3), 1e-6F))
+        << name << ": " << BoxOf(shape).max().transpose();
   }
 }
 
