@@ -30,6 +30,7 @@ constexpr std::size_t kRaysBetweenChecks = 1024;
 absl::Status OccupancyVoxelsOptions::Validate() const {
   OptionChecks checks("occupancy");
   checks.InRange("voxel_m", voxel_m, 0.001, 1000.0);
+  checks.InRange("farthest_voxel", farthest_voxel, 1.0, kMostNodes);
   checks.InRange("least", model.least, 0.01, 0.49);
   checks.InRange("most", model.most, 0.51, 0.99);
   checks.InRange("hit", model.hit, 0.51, model.most);
@@ -42,6 +43,7 @@ absl::Status OccupancyVoxelsOptions::Validate() const {
 
 OccupancyVoxels::OccupancyVoxels(const OccupancyVoxelsOptions& options)
     : voxel_m_(options.voxel_m),
+      farthest_voxel_(options.farthest_voxel),
       hit_(OddsOf(options.model.hit)),
       miss_(OddsOf(options.model.miss)),
       least_(OddsOf(options.model.least)),
@@ -135,14 +137,14 @@ absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
       ray.hits = false;
     }
     if (!Clip(ray)) continue;
-    if (std::max(ray.from.cwiseAbs().maxCoeff(), ray.to.cwiseAbs().maxCoeff()) >= kMaxVoxel) {
+    if (std::max(ray.from.cwiseAbs().maxCoeff(), ray.to.cwiseAbs().maxCoeff()) >= farthest_voxel_) {
       return absl::OutOfRangeError(absl::StrFormat(
           "occupancy: a ray from (%.1f, %.1f, %.1f) leaves the %.1f m around 0 that voxels of "
-          "%g m reach; take larger ones or a region",
+          "%g m reach; take larger ones",
           from.x() * voxel_m_,
           from.y() * voxel_m_,
           from.z() * voxel_m_,
-          kMaxVoxel * voxel_m_,
+          farthest_voxel_ * voxel_m_,
           voxel_m_));
     }
     const Vector3i end = VoxelOf(ray.to);

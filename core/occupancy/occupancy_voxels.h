@@ -28,7 +28,7 @@ enum class Occupancy : std::uint8_t { kUnknown = 0, kFree = 1, kOccupied = 2 };
 // Those of a block, as NodeInBlock counts; voxel n is [n, n + 1) · voxel_m along each axis.
 using OccupancyBlock = std::array<Occupancy, kBlockNodes>;
 
-// Voxels lie in [-kMaxVoxel, kMaxVoxel) along each axis, as OctoMap's do.
+// OctoMap's voxels lie in [-kMaxVoxel, kMaxVoxel) along each axis.
 inline constexpr int kMaxVoxel = 1 << 15;
 
 // What one scan says of a voxel that it hits or looks through (the inverse sensor model λ of thesis
@@ -59,6 +59,8 @@ struct OccupancyVoxelsOptions {
   InverseSensorModel model = {};
   // Only voxels whose middles lie in it, of rays that end outside, too [m].
   Eigen::AlignedBox3d region = {Eigen::Vector3d::Constant(-1e9), Eigen::Vector3d::Constant(1e9)};
+  // No ray reaches it along an axis: as far as files of OctoMap reach; in [1, kMostNodes].
+  double farthest_voxel = kMaxVoxel;
 
   absl::Status Validate() const;
 };
@@ -73,8 +75,8 @@ class OccupancyVoxels {
 
   // Points that are not finite or nearer than the sensor sees are left out; of one that is farther
   // than it sees, the ray as far as it does: a beam that nothing came back from is a point beyond
-  // the sensor's range. OUT_OF_RANGE for what lies beyond kMaxVoxel, RESOURCE_EXHAUSTED beyond 2
-  // GB, CANCELLED, DEADLINE_EXCEEDED; the grid is to be thrown away then.
+  // the sensor's range. OUT_OF_RANGE for what lies beyond farthest_voxel, RESOURCE_EXHAUSTED beyond
+  // 2 GB, CANCELLED, DEADLINE_EXCEEDED; the grid is to be thrown away then.
   absl::Status Add(const PointCloud& cloud,
                    const Pose& T_map_scan,
                    const SensorModel& sensor,
@@ -141,6 +143,7 @@ class OccupancyVoxels {
   }
 
   double voxel_m_;
+  double farthest_voxel_;
   std::int16_t hit_, miss_, least_, most_;
   bool hits_stay_;
   VoxelBox kept_;

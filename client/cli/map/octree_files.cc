@@ -36,8 +36,13 @@ absl::Status ExportOctree(Context& context,
   for (std::size_t i = 0; i < clouds.size(); ++i) {
     progress.Update(static_cast<double>(i) / static_cast<double>(clouds.size()), "free space");
     STRATA_ASSIGN_OR_RETURN(const PosedCloud posed, clouds.Read(context, i));
-    STRATA_RETURN_IF_ERROR(
-        grid.Add(posed.cloud, posed.T_map_scan, posed.sensor, context.call.stop));
+    const absl::Status added =
+        grid.Add(posed.cloud, posed.T_map_scan, posed.sensor, context.call.stop);
+    if (absl::IsOutOfRange(added)) {
+      return absl::OutOfRangeError(absl::StrCat(
+          added.message(), " (--level), or export --format pcd, which reaches any place"));
+    }
+    STRATA_RETURN_IF_ERROR(added);
   }
   const OctreeFile octree = BtFile(grid, options.with_free);
   if (octree.nodes == 0) {

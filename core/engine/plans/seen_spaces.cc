@@ -112,6 +112,7 @@ absl::StatusOr<SeenSpace> SeenSpaces::Begin(const Eigen::AlignedBox3d& region,
   options.voxel_m = voxel_m;
   options.region = region;
   options.model = InverseSensorModel::OfOneLook();
+  options.farthest_voxel = kMostNodes;  // maps may lie where UTM has them
   STRATA_RETURN_IF_ERROR(options.Validate());
   return SeenSpace{OccupancyVoxels(options)};
 }

@@ -141,6 +141,24 @@ TEST(OccupancyVoxelsTest, BeyondTheSensorsRangeARayTellsOfFreeSpaceUpToIt) {
   EXPECT_GT(reader.Probability({0, 0, 10}), 0.5);
 }
 
+// As far as OctoMap's files reach, or as far as is said: UTM is farther.
+TEST(OccupancyVoxelsTest, MapsMayLieFarAway) {
+  const Pose far(Eigen::Translation3d(4e5 + 0.05, 5e6 + 0.05, 0.05));
+  PointCloud cloud;
+  cloud.points = {{1.0F, 0.0F, 0.0F}};
+  OccupancyVoxelsOptions options;
+  OccupancyVoxels near(options);
+  EXPECT_THAT(near.Add(cloud, far, SensorModel(), Stop()),
+              StatusIs(absl::StatusCode::kOutOfRange, HasSubstr("3276.8 m")));
+  options.farthest_voxel = kMostNodes;
+  STRATA_ASSERT_OK(options.Validate());
+  OccupancyVoxels grid(options);
+  STRATA_ASSERT_OK(grid.Add(cloud, far, SensorModel(), Stop()));
+  OccupancyReader reader(grid);
+  EXPECT_GT(reader.Probability({4'000'010, 50'000'000, 0}), 0.5);
+  EXPECT_LT(reader.Probability({4'000'005, 50'000'000, 0}), 0.5);
+}
+
 TEST(OccupancyVoxelsTest, ModelsOutOfRangeAreNamed) {
   OccupancyVoxelsOptions options;
   options.model.hit = 0.99;
