@@ -37,10 +37,12 @@ absl::StatusOr<FetchedEntities> FetchEntities(Context& context,
         fetched.entities.push_back(entity);
         return absl::OkStatus();
       }));
-  STRATA_ASSIGN_OR_RETURN(
-      fetched.stale,
-      IsOfEarlierEpoch(
-          context, map, fetched.info.epoch, "these entities are", "objects find finds them anew"));
+  STRATA_ASSIGN_OR_RETURN(fetched.stale,
+                          IsOfEarlierState(context,
+                                           map,
+                                           {fetched.info.epoch},
+                                           "these entities are",
+                                           "objects find finds them anew"));
   return fetched;
 }
 

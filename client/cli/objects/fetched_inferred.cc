@@ -50,9 +50,9 @@ absl::StatusOr<FetchedInferred> FetchInferred(Context& context,
                                 return absl::OkStatus();
                               }));
   STRATA_ASSIGN_OR_RETURN(fetched.stale,
-                          IsOfEarlierEpoch(context,
+                          IsOfEarlierState(context,
                                            map,
-                                           fetched.info.epoch,
+                                           {fetched.info.epoch},
                                            "what was inferred is",
                                            "objects find and objects complete make it anew"));
   return fetched;

@@ -21,10 +21,12 @@ absl::StatusOr<FetchedPlanes> FetchPlanes(Context& context, const std::string& m
   STRATA_RETURN_IF_ERROR(info.status());
   planes.info = *std::move(info);
   planes.model.directions = planes.info.directions;
-  STRATA_ASSIGN_OR_RETURN(
-      planes.stale,
-      IsOfEarlierEpoch(
-          context, map, planes.info.epoch, "these planes are", "planes find makes them anew"));
+  STRATA_ASSIGN_OR_RETURN(planes.stale,
+                          IsOfEarlierState(context,
+                                           map,
+                                           {planes.info.epoch, planes.info.scans},
+                                           "these planes are",
+                                           "planes find makes them anew"));
   return planes;
 }
 

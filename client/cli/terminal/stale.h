@@ -1,4 +1,4 @@
-// Whether what a job made is of an earlier epoch than the map.
+// Whether what a job made is of an earlier state of the map.
 #ifndef STRATA_CLIENT_CLI_TERMINAL_STALE_H_
 #define STRATA_CLIENT_CLI_TERMINAL_STALE_H_
 
@@ -12,11 +12,17 @@
 
 namespace strata::cli {
 
-// Whether the map has another epoch now, which is said on stderr: "WHAT of epoch 3, the map is at
-// 4; CURE".
-absl::StatusOr<bool> IsOfEarlierEpoch(Context& context,
+// What a job looked at.
+struct LookedAt {
+  std::uint64_t epoch = 0;
+  std::uint64_t scans = 0;  // 0: what came from deleted ones is gone
+};
+
+// Whether the map has another epoch now, or fewer scans than were looked at, which is said on
+// stderr: "WHAT of epoch 3, the map is at 4; CURE", "WHAT of 34 scans, the map has 29; CURE".
+absl::StatusOr<bool> IsOfEarlierState(Context& context,
                                       const std::string& map,
-                                      std::uint64_t epoch,
+                                      const LookedAt& looked_at,
                                       absl::string_view what,
                                       absl::string_view cure);
 

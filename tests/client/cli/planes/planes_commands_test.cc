@@ -54,6 +54,7 @@ TEST_F(PlanesCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
     PlaneModelInfo info;
     info.job = 4;
     info.epoch = 2;
+    info.scans = 34;
     info.planes = room.planes.size();
     info.directions = {{Eigen::Vector3d::UnitZ(), 2, 0.01}};
     return absl::StatusOr<PlaneModelInfo>(info);
@@ -64,6 +65,12 @@ TEST_F(PlanesCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
     epoch.epoch = now;
     epoch.current = true;
     return absl::StatusOr<std::vector<EpochInfo>>({epoch});
+  });
+  std::uint64_t scans = 34;
+  ON_CALL(db_.maps(), Stats(_, _)).WillByDefault([&](auto&, auto) {
+    MapStats stats;
+    stats.scans = scans;
+    return absl::StatusOr<MapStats>(stats);
   });
   ON_CALL(db_.maps(), Get(_, _)).WillByDefault([](auto&, auto) {
     return absl::StatusOr<MapInfo>(MapInfo());
@@ -78,6 +85,10 @@ TEST_F(PlanesCommandsTest, PlanesOfAMapAreShownExportedAndDrawn) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 6 + 1) << text;
   EXPECT_THAT(text, HasSubstr("direction 0: 0.0000 0.0000 1.0000, 2 planes"));
   EXPECT_EQ(RunJson({"planes", "model", "m"})["stale"], false);
+  scans = 29;  // five were deleted
+  EXPECT_EQ(RunJson({"planes", "model", "m"})["stale"], true);
+  EXPECT_THAT(talk_.str(), HasSubstr("of 34 scans, the map has 29"));
+  scans = 34;
   now = 3;
   const auto model = RunJson({"planes", "model", "m"});
   EXPECT_EQ(model["stale"], true);
