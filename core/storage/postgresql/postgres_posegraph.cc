@@ -22,6 +22,10 @@
 namespace strata {
 namespace {
 
+// Of constraints and planes: those of the current epoch, which no job proposes.
+#define STRATA_IN_FORCE \
+  "proposed_by = 0 AND until_epoch > (SELECT epoch FROM truth_map WHERE map = $1)"
+
 absl::Status NoSuchConstraint(std::uint64_t id) {
   return absl::NotFoundError(absl::StrCat("constraint ", id, " does not exist"));
 }
@@ -92,9 +96,10 @@ absl::StatusOr<std::vector<ProposedPose>> PostgresReader::ListProposedPoses(std:
 absl::StatusOr<std::vector<EpochInfo>> PostgresReader::ListEpochs() {
   STRATA_ASSIGN_OR_RETURN(
       Rows row,
-      Ask("SELECT e.epoch, e.created_us, e.reason, e.job, (SELECT count(*) FROM truth_pose AS p "
-          "WHERE p.map = e.map AND p.epoch = e.epoch), m.epoch, m.oldest_epoch FROM truth_epoch AS "
-          "e JOIN truth_map AS m ON m.map = e.map WHERE e.map = $1 ORDER BY e.epoch DESC"));
+      Ask("SELECT e.epoch, e.created_us, e.reason, e.job, coalesce(p.decided, 0), m.epoch, "
+          "m.oldest_epoch FROM truth_epoch AS e JOIN truth_map AS m ON m.map = e.map LEFT JOIN "
+          "(SELECT epoch, count(*) AS decided FROM truth_pose WHERE map = $1 GROUP BY epoch) AS p "
+          "ON p.epoch = e.epoch WHERE e.map = $1 ORDER BY e.epoch DESC"));
   std::vector<EpochInfo> epochs;
   while (row.Next()) epochs.push_back(ReadEpoch(row));
   return epochs;
@@ -144,19 +149,24 @@ absl::StatusOr<std::uint64_t> PostgresWriter::PutConstraint(const ConstraintReco
 }
 
 absl::Status PostgresWriter::DeleteConstraint(std::uint64_t id) {
-  STRATA_ASSIGN_OR_RETURN(const std::uint64_t deleted,
-                          Change("DELETE FROM truth_constraint WHERE map = $1 AND id = $2", id));
+  STRATA_ASSIGN_OR_RETURN(
+      const std::uint64_t deleted,
+      Change("DELETE FROM truth_constraint WHERE map = $1 AND id = $2 AND " STRATA_IN_FORCE, id));
   return deleted > 0 ? absl::OkStatus() : NoSuchConstraint(id);
 }
 
 absl::Status PostgresWriter::EnableConstraint(std::uint64_t id, bool enabled) {
-  STRATA_ASSIGN_OR_RETURN(
-      const std::uint64_t constraints,
-      Change("UPDATE truth_constraint SET enabled = $3 WHERE map = $1 AND id = $2", id, enabled));
+  STRATA_ASSIGN_OR_RETURN(const std::uint64_t constraints,
+                          Change("UPDATE truth_constraint SET enabled = $3 WHERE map = $1 AND id = "
+                                 "$2 AND " STRATA_IN_FORCE,
+                                 id,
+                                 enabled));
   if (constraints > 0) return absl::OkStatus();
   STRATA_ASSIGN_OR_RETURN(
       const std::uint64_t planes,
-      Change("UPDATE truth_plane SET enabled = $3 WHERE map = $1 AND id = $2", id, enabled));
+      Change("UPDATE truth_plane SET enabled = $3 WHERE map = $1 AND id = $2 AND " STRATA_IN_FORCE,
+             id,
+             enabled));
   return planes > 0 ? absl::OkStatus() : NoSuchConstraint(id);
 }
 

@@ -23,6 +23,10 @@
 namespace strata {
 namespace {
 
+// Of constraints and planes: those of the current epoch, which no job proposes.
+#define STRATA_IN_FORCE \
+  "proposed_by = 0 AND until_epoch > (SELECT epoch FROM truth_map WHERE id = 1)"
+
 absl::Status NoSuchConstraint(std::uint64_t id) {
   return absl::NotFoundError(absl::StrCat("constraint ", id, " does not exist"));
 }
@@ -94,10 +98,10 @@ absl::StatusOr<std::vector<ProposedPose>> SqliteReader::ListProposedPoses(std::u
 absl::StatusOr<std::vector<EpochInfo>> SqliteReader::ListEpochs() {
   STRATA_ASSIGN_OR_RETURN(
       Statement row,
-      database_.Prepare("SELECT e.epoch, e.created_us, e.reason, e.job, (SELECT count(*) FROM "
-                        "truth_pose AS p WHERE p.epoch = e.epoch), m.epoch, m.oldest_epoch "
-                        "FROM truth_epoch AS e, truth_map AS m WHERE m.id = 1 "
-                        "ORDER BY e.epoch DESC"));
+      database_.Prepare("SELECT e.epoch, e.created_us, e.reason, e.job, coalesce(p.decided, 0), "
+                        "m.epoch, m.oldest_epoch FROM truth_map AS m, truth_epoch AS e LEFT JOIN "
+                        "(SELECT epoch, count(*) AS decided FROM truth_pose GROUP BY epoch) AS p "
+                        "ON p.epoch = e.epoch WHERE m.id = 1 ORDER BY e.epoch DESC"));
   std::vector<EpochInfo> epochs;
   STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
     epochs.push_back(ReadEpoch(row));
@@ -151,17 +155,19 @@ absl::StatusOr<std::uint64_t> SqliteWriter::PutConstraint(const ConstraintRecord
 }
 
 absl::Status SqliteWriter::DeleteConstraint(std::uint64_t id) {
-  STRATA_RETURN_IF_ERROR(RunSql("DELETE FROM truth_constraint WHERE id = ?1", id));
+  STRATA_RETURN_IF_ERROR(
+      RunSql("DELETE FROM truth_constraint WHERE id = ?1 AND " STRATA_IN_FORCE, id));
   STRATA_ASSIGN_OR_RETURN(const bool deleted, Changed());
   return deleted ? absl::OkStatus() : NoSuchConstraint(id);
 }
 
 absl::Status SqliteWriter::EnableConstraint(std::uint64_t id, bool enabled) {
-  STRATA_RETURN_IF_ERROR(
-      RunSql("UPDATE truth_constraint SET enabled = ?2 WHERE id = ?1", id, enabled));
+  STRATA_RETURN_IF_ERROR(RunSql(
+      "UPDATE truth_constraint SET enabled = ?2 WHERE id = ?1 AND " STRATA_IN_FORCE, id, enabled));
   STRATA_ASSIGN_OR_RETURN(const bool constraint, Changed());
   if (constraint) return absl::OkStatus();
-  STRATA_RETURN_IF_ERROR(RunSql("UPDATE truth_plane SET enabled = ?2 WHERE id = ?1", id, enabled));
+  STRATA_RETURN_IF_ERROR(RunSql(
+      "UPDATE truth_plane SET enabled = ?2 WHERE id = ?1 AND " STRATA_IN_FORCE, id, enabled));
   STRATA_ASSIGN_OR_RETURN(const bool plane, Changed());
   return plane ? absl::OkStatus() : NoSuchConstraint(id);
 }
@@ -216,7 +222,7 @@ absl::Status SqliteWriter::InsertPlane(const PlaneRecord& record, std::uint64_t 
 absl::Status SqliteWriter::AdoptProposal(std::uint64_t job) {
   STRATA_RETURN_IF_ERROR(
       RunSql("UPDATE truth_plane SET until_epoch = (SELECT epoch FROM truth_map WHERE id = 1) "
-             "WHERE proposed_by = 0 AND until_epoch > (SELECT epoch FROM truth_map WHERE id = 1)"));
+             "WHERE " STRATA_IN_FORCE));
   for (const char* sql :
        {"UPDATE truth_plane SET proposed_by = 0, since_epoch = (SELECT epoch FROM truth_map WHERE "
         "id = 1) WHERE proposed_by = ?1",

@@ -42,6 +42,11 @@ TEST_F(PosegraphContractTest, PoseOfAnEpochIsTheNewestUpToIt) {
     EXPECT_EQ(scan.pose->T_map_scan.translation().x(), x) << epoch;
   }
   EXPECT_FALSE(reader().GetScan(number, 0)->pose.has_value());
+  STRATA_ASSERT_OK(Commit([&] { return writer().BeginEpoch("empty", 0).status(); }));
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto epochs, reader().ListEpochs());
+  ASSERT_EQ(epochs.size(), 2U);
+  EXPECT_EQ(epochs[0].decided, 0U);
+  EXPECT_EQ(epochs[1].decided, 1U);
   EXPECT_EQ(reader().GetScan(number, 9)->scan.header.T_map_scan.translation().x(), 1.1);
 }
 
@@ -134,6 +139,43 @@ TEST_F(PosegraphContractTest, ProposalsAreSeenOnceAdoptedAndGoneOnceDiscarded) {
   EXPECT_EQ(reader().ListConstraints(3)->size(), 2U);
   EXPECT_EQ(reader().ListPlanes(3)->size(), 1U);
   EXPECT_NE(reader().ListPlanes(3)->at(0).plane.id, reader().ListPlanes(2)->at(0).plane.id);
+}
+
+// What a job proposes is listed nowhere yet, and what an epoch ended is history.
+TEST_F(PosegraphContractTest, WhatIsNotInForceIsNeitherSwitchedNorRemoved) {
+  const ScanNumber a = Put(1);
+  const ScanNumber b = Put(2);
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(
+        writer().ProposeConstraint(3, Between(a, b, ConstraintOrigin::kOptimize)));
+    return writer().ProposePlane(3, PlaneOf({a, b}));
+  }));
+  const auto expect_none = [&](std::uint64_t id) {
+    for (const bool enabled : {false, true}) {
+      EXPECT_THAT(Commit([&] { return writer().EnableConstraint(id, enabled); }),
+                  StatusIs(absl::StatusCode::kNotFound, HasSubstr("constraint")))
+          << id;
+    }
+    EXPECT_THAT(Commit([&] { return writer().DeleteConstraint(id); }),
+                StatusIs(absl::StatusCode::kNotFound, HasSubstr("constraint")))
+        << id;
+  };
+  expect_none(1);
+  expect_none(2);
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().BeginEpoch("better", 3).status());
+    return writer().AdoptProposal(3);
+  }));
+  for (const std::uint64_t id : {1, 2}) {
+    STRATA_EXPECT_OK(Commit([&] { return writer().EnableConstraint(id, false); }));
+  }
+  STRATA_ASSERT_OK(Commit([&]() -> absl::Status {
+    STRATA_RETURN_IF_ERROR(writer().BeginEpoch("back", 0).status());
+    return writer().RestoreConstraints(1);
+  }));
+  expect_none(1);
+  expect_none(2);
+  EXPECT_EQ(reader().ListConstraints(2)->size(), 1U);
 }
 
 TEST_F(PosegraphContractTest, AnEpochComesBackWithItsConstraints) {
