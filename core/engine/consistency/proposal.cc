@@ -1,12 +1,18 @@
 #include "core/engine/consistency/proposal.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <map>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 
 #include "core/common/status.h"
+#include "core/geometry/primitives.h"
 
 namespace strata {
 namespace {
@@ -15,12 +21,11 @@ namespace {
 absl::StatusOr<bool> MovedByHand(const PoseRecord& pose, std::uint64_t base_epoch) {
   if (pose.epoch <= base_epoch || pose.origin == PoseOrigin::kIngest) return false;
   if (pose.origin == PoseOrigin::kPerson) return true;
-  return absl::FailedPreconditionError(
-      absl::StrCat("the map went from epoch ",
-                   base_epoch,
-                   " to ",
-                   pose.epoch,
-                   " since this was proposed; revert the job and start another"));
+  return absl::FailedPreconditionError(absl::StrCat("the map went from epoch ",
+                                                    base_epoch,
+                                                    " to ",
+                                                    pose.epoch,
+                                                    " since this was proposed; start another"));
 }
 
 absl::StatusOr<PoseChange> ReadChange(MapCore& core, const JobInfo& job, std::uint64_t base_epoch) {
@@ -38,6 +43,84 @@ absl::StatusOr<PoseChange> ReadChange(MapCore& core, const JobInfo& job, std::ui
     change.Decide(posed.scan.number, by_hand ? posed.pose->T_map_scan : it->second);
   }
   return change;
+}
+
+struct PoseBeforeAndAfter {
+  Pose before, after;
+};
+using PosesOfScans = std::map<ScanNumber, PoseBeforeAndAfter>;
+
+PosesOfScans BeforeAndAfter(const PoseChange& change, const std::vector<ProposedPose>& moves) {
+  PosesOfScans poses;
+  for (const PosedScan& posed : change.scans()) {
+    poses[posed.scan.number] = {posed.pose->T_map_scan, posed.pose->T_map_scan};
+  }
+  for (const ProposedPose& move : moves) poses.at(move.scan).after = move.T_map_scan;
+  return poses;
+}
+
+Plane InScan(const Pose& T_map_scan, const Plane& plane_map) {
+  return {T_map_scan.linear().transpose() * plane_map.normal,
+          plane_map.distance - plane_map.normal.dot(T_map_scan.translation())};
+}
+
+// Whether a scan sees both in one place, each at the poses that it is of.
+bool AreOnePlane(const PlaneRecord& before, const PlaneRecord& after, const PosesOfScans& poses) {
+  constexpr double kSameCosine = 0.9986;
+  constexpr double kSameDistanceM = 0.2;
+  return std::ranges::any_of(before.scans, [&](ScanNumber scan) {
+    const auto pose = poses.find(scan);
+    if (pose == poses.end() || std::ranges::find(after.scans, scan) == after.scans.end()) {
+      return false;
+    }
+    const Plane was = InScan(pose->second.before, before.plane.plane);
+    const Plane is = InScan(pose->second.after, after.plane.plane);
+    return was.normal.dot(is.normal) >= kSameCosine &&
+           std::abs(was.distance - is.distance) <= kSameDistanceM;
+  });
+}
+
+// Between the same two scans, found by the same means.
+bool AreOneClosure(const ConstraintRecord& a, const ConstraintRecord& b) {
+  return a.scan_i == b.scan_i && a.scan_j == b.scan_j && a.constraint.origin == b.constraint.origin;
+}
+
+// What another proposal brought meanwhile is there once.
+absl::Status DropSecondClosures(StorageWriter& writer,
+                                const std::vector<ConstraintRecord>& before,
+                                const std::vector<ConstraintRecord>& after) {
+  std::set<std::uint64_t> known;
+  for (const ConstraintRecord& record : before) known.insert(record.constraint.id);
+  for (const ConstraintRecord& now : after) {
+    const bool is_second = !known.contains(now.constraint.id) &&
+                           std::ranges::any_of(before, [&](const ConstraintRecord& record) {
+                             return AreOneClosure(record, now);
+                           });
+    if (is_second) STRATA_RETURN_IF_ERROR(writer.DeleteConstraint(now.constraint.id));
+  }
+  return absl::OkStatus();
+}
+
+// Planes that were switched off after the job had looked stay off.
+absl::Status Adopt(StorageWriter& writer, const JobInfo& job, const PosesOfScans& poses) {
+  STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> before,
+                          writer.reader().ListPlanes(clock.epoch));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> held,
+                          writer.reader().ListConstraints(clock.epoch));
+  STRATA_RETURN_IF_ERROR(writer.AdoptProposal(job.id));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<ConstraintRecord> holding,
+                          writer.reader().ListConstraints(clock.epoch));
+  STRATA_RETURN_IF_ERROR(DropSecondClosures(writer, held, holding));
+  STRATA_ASSIGN_OR_RETURN(const std::vector<PlaneRecord> after,
+                          writer.reader().ListPlanes(clock.epoch));
+  for (const PlaneRecord& now : after) {
+    const bool is_off = now.plane.enabled && std::ranges::any_of(before, [&](const auto& record) {
+                          return !record.plane.enabled && AreOnePlane(record, now, poses);
+                        });
+    if (is_off) STRATA_RETURN_IF_ERROR(writer.EnableConstraint(now.plane.id, false));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -64,7 +147,8 @@ absl::Status ApplyProposal(Integrator& integrator,
   MapCore& core = integrator.core();
   STRATA_ASSIGN_OR_RETURN(const PoseChange change, ReadChange(core, job, base_epoch));
   PoseChange::Outcome outcome = change.Resolve(tolerance);
-  const auto adopt = [&job](StorageWriter& writer) { return writer.AdoptProposal(job.id); };
+  const PosesOfScans poses = BeforeAndAfter(change, outcome.moves);
+  const auto adopt = [&](StorageWriter& writer) { return Adopt(writer, job, poses); };
   MoveOutcome moved;
   moved.epoch = core.snapshots().current().epoch;
   context.SetMetric("epoch_before", static_cast<double>(moved.epoch));

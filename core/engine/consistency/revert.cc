@@ -1,6 +1,8 @@
 #include "core/engine/consistency/revert.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
@@ -8,6 +10,7 @@
 #include "core/common/status.h"
 #include "core/engine/ingest/pose_change.h"
 #include "core/engine/tiles/epoch_tiles.h"
+#include "core/world/job_kinds.h"
 
 namespace strata {
 namespace {
@@ -25,6 +28,14 @@ absl::StatusOr<PoseChange> ReadChange(MapCore& core, std::uint64_t epoch) {
 }
 
 }  // namespace
+
+absl::Status CheckNoneReverts(const std::vector<JobInfo>& jobs) {
+  const auto reverts = std::ranges::find_if(
+      jobs, [](const JobInfo& job) { return job.kind == kRevertJob && !IsFinal(job.state); });
+  if (reverts == jobs.end()) return absl::OkStatus();
+  return absl::FailedPreconditionError(
+      absl::StrCat("job ", reverts->id, " goes back already; wait for it"));
+}
 
 absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current) {
   const auto before = job.metrics.find("epoch_before");

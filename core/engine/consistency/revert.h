@@ -3,6 +3,7 @@
 #define STRATA_CORE_ENGINE_CONSISTENCY_REVERT_H_
 
 #include <cstdint>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -15,6 +16,10 @@ namespace strata {
 
 // The one before the epoch that `job` made, which must be the current one. FAILED_PRECONDITION.
 absl::StatusOr<std::uint64_t> EpochBefore(const JobInfo& job, std::uint64_t current);
+
+// FAILED_PRECONDITION where a job that goes back waits or runs: another would undo what came
+// between.
+absl::Status CheckNoneReverts(const std::vector<JobInfo>& jobs);
 
 // On the worker: makes the poses of `epoch` those of a new epoch.
 // Scans that had none then are carried by their partners. NOT_FOUND for an epoch that never was,

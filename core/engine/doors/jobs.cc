@@ -133,6 +133,7 @@ absl::StatusOr<JobInfo> EngineJobs::Revert(const api::Call& call,
   Map& found = *place.map;
   STRATA_ASSIGN_OR_RETURN(const JobInfo job, Find(found, id));
   if (job.state == JobState::kProposed) return found.jobs().Discard(id);
+  STRATA_RETURN_IF_ERROR(CheckNoneReverts(found.jobs().List()));
   STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch,
                           EpochBefore(job, found.core().snapshots().current().epoch));
   STRATA_ASSIGN_OR_RETURN(

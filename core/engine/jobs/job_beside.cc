@@ -77,7 +77,7 @@ absl::StatusOr<JobInfo> StartJobBeside(MapStorage& store,
 absl::StatusOr<JobInfo> CancelJobBeside(MapStorage& store, std::uint64_t id) {
   std::optional<JobInfo> ended;
   absl::StatusOr<JobInfo> cancelled =
-      ChangeBeside(store, id, [&ended](JobInfo& job, StorageWriter&) -> absl::Status {
+      ChangeBeside(store, id, [&ended](JobInfo& job, StorageWriter& writer) -> absl::Status {
         ended.reset();
         if (IsFinal(job.state)) {
           ended = job;
@@ -89,7 +89,7 @@ absl::StatusOr<JobInfo> CancelJobBeside(MapStorage& store, std::uint64_t id) {
           job.state = JobState::kCancelled;
           ForgetToldToEnd(job);
         }
-        return absl::OkStatus();
+        return DropProposalOfEnded(job, writer);
       });
   if (ended.has_value()) return *std::move(ended);
   return cancelled;
@@ -109,6 +109,8 @@ absl::StatusOr<JobInfo> RevertJobBeside(MapStorage& store, std::uint64_t id) {
       STRATA_ASSIGN_OR_RETURN(told, ChangeStoredJob(writer, id, &DiscardProposal));
       return absl::OkStatus();
     }
+    STRATA_ASSIGN_OR_RETURN(const std::vector<JobInfo> all, writer.reader().ListJobs());
+    STRATA_RETURN_IF_ERROR(CheckNoneReverts(all));
     STRATA_ASSIGN_OR_RETURN(const MapClock clock, writer.reader().GetClock());
     STRATA_ASSIGN_OR_RETURN(const std::uint64_t epoch, EpochBefore(*job, clock.epoch));
     told = NewJob(kRevertJob, {{"epoch", absl::StrCat(epoch)}});

@@ -340,7 +340,7 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
     }
     std::optional<Stop> run;
     absl::StatusOr<JobInfo> cancelled =
-        Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter&) -> absl::Status {
+        Change(id, Durability::kFull, [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
           if (IsFinal(job.state)) return absl::AbortedError("the job has ended");
           const bool elsewhere = RunsElsewhere(job);
           run = elsewhere ? std::nullopt : StopOfRun(job);
@@ -350,7 +350,7 @@ absl::StatusOr<JobInfo> JobBoard::Cancel(std::uint64_t id) {
             job.state = JobState::kCancelled;
             ForgetToldToEnd(job);
           }
-          return absl::OkStatus();
+          return DropProposalOfEnded(job, writer);
         });
     if (!absl::IsAborted(cancelled.status())) {
       if (run.has_value()) run->Request();
@@ -566,8 +566,9 @@ absl::Status JobBoard::Finish(std::uint64_t id, const absl::Status& ended, Runni
   // Durable before anybody sees that it ended.
   return Change(id,
                 Durability::kFull,
-                [&](JobInfo& job, StorageWriter& writer) {
+                [&](JobInfo& job, StorageWriter& writer) -> absl::Status {
                   EndJob(job, ended, context.result());
+                  STRATA_RETURN_IF_ERROR(DropProposalOfEnded(job, writer));
                   return quarantine_.End(writer, work);
                 })
       .status();

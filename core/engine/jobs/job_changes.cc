@@ -54,6 +54,11 @@ absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer) {
   return writer.DiscardProposal(job.id);
 }
 
+absl::Status DropProposalOfEnded(const JobInfo& job, StorageWriter& writer) {
+  const bool is_over = job.state == JobState::kFailed || job.state == JobState::kCancelled;
+  return is_over ? writer.DiscardProposal(job.id) : absl::OkStatus();
+}
+
 void EndJob(JobInfo& job, const absl::Status& ended, const JobResult& result) {
   for (const auto& [name, value] : result.metrics) job.metrics[name] = value;
   job.phase.clear();
@@ -94,6 +99,7 @@ absl::Status ReturnDeadJob(JobInfo& job, StorageWriter& writer) {
   const WorkId work{WorkKind::kJob, job.id};
   if (IsToldToEnd(job)) {
     EndJob(job, absl::CancelledError("the server that ran it died"), {});
+    STRATA_RETURN_IF_ERROR(DropProposalOfEnded(job, writer));
     return writer.DeleteAttempt(work);
   }
   STRATA_ASSIGN_OR_RETURN(const std::vector<Attempt> attempts, writer.reader().ListAttempts());

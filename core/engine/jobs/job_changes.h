@@ -34,6 +34,9 @@ absl::Status AcceptProposal(JobInfo& job, StorageWriter& writer);
 // Ends a proposed job as cancelled and forgets its proposal. FAILED_PRECONDITION.
 absl::Status DiscardProposal(JobInfo& job, StorageWriter& writer);
 
+// Takes what it proposed out of the store if it failed or was cancelled: nobody can accept it.
+absl::Status DropProposalOfEnded(const JobInfo& job, StorageWriter& writer);
+
 // What a run of a job told.
 struct JobResult {
   std::map<std::string, double> metrics;

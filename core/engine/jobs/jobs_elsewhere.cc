@@ -309,6 +309,7 @@ absl::Status JobsElsewhere::RecordEnd(const UnfinishedJob& job,
       const auto change = [&](JobInfo& now, StorageWriter&) -> absl::Status {
         if (!again) {
           EndJob(now, ended, result);
+          STRATA_RETURN_IF_ERROR(DropProposalOfEnded(now, writer));
           return writer.DeleteAttempt({WorkKind::kJob, now.id});
         }
         now.state = JobState::kQueued;

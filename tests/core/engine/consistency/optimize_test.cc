@@ -317,6 +317,33 @@ TEST_F(OptimizeTest, WhatAPersonSetMeanwhileStays) {
   ExpectSound();
 }
 
+// Where nothing moves no epoch comes between them, and both are of the world as it is.
+TEST_F(OptimizeTest, TwoProposalsBringTheirClosuresOnce) {
+  MakeMap(MapParameters());
+  for (const std::string robot : {"run", "other"}) {
+    for (std::uint64_t k = 1; k <= kScans; ++k) {
+      const PointCloud cloud = See(TruthOf(k), k + (robot == "run" ? 0 : 100));
+      const ScanHeader header = HeaderOf({robot, k}, cloud, TruthOf(k), Alignment::kOff);
+      STRATA_ASSERT_OK(Upload(db(), header, cloud));
+    }
+  }
+  WaitIntegrated(db());
+  const std::map<std::string, std::string> still = {
+      {"dry_run", "1"}, {"closures", "1"}, {"tolerance_m", "1"}, {"tolerance_rad", "1"}};
+  const JobInfo first = Optimize(still);
+  const JobInfo second = Optimize(still);
+  std::size_t closures = 0;
+  for (const JobInfo& job : {first, second}) {
+    ASSERT_EQ(job.state, JobState::kProposed) << job.message;
+    EXPECT_GT(job.metrics.at("closures"), 0.0);
+    STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, job.id));
+    ASSERT_EQ(Follow(job.id).state, JobState::kSucceeded);
+    if (closures == 0) closures = Graph().constraints.size();
+  }
+  EXPECT_GT(closures, 0U);
+  EXPECT_EQ(Graph().constraints.size(), closures);
+}
+
 TEST_F(OptimizeTest, AProposalOfAnOldWorldIsNotApplied) {
   MakeWorld();
   const JobInfo old = Optimize({{"dry_run", "1"}});
@@ -329,6 +356,18 @@ TEST_F(OptimizeTest, AProposalOfAnOldWorldIsNotApplied) {
   EXPECT_THAT(failed.message, HasSubstr("epoch"));
   EXPECT_EQ(Digest(), digest);
   ExpectEqual(Poses(), poses);
+  const JobInfo cancelled = Optimize({{"dry_run", "1"}});
+  STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo busy, db().jobs().Start({}, kMapName, "rebuild", {}));
+  STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, cancelled.id));
+  STRATA_ASSERT_OK(db().jobs().Cancel({}, kMapName, cancelled.id));
+  Follow(cancelled.id);
+  Follow(busy.id);
+  Close();  // nobody can accept what they proposed: it is gone
+  EXPECT_EQ(
+      Number("SELECT count(*) FROM truth_proposed_pose WHERE job = " + std::to_string(old.id)), 0);
+  EXPECT_EQ(Number("SELECT (SELECT count(*) FROM truth_plane WHERE proposed_by <> 0) + (SELECT "
+                   "count(*) FROM truth_proposed_pose)"),
+            0);
 }
 
 TEST_F(OptimizeTest, AJobThatWasKilledAfterItsEpochMakesNoSecondOne) {
@@ -392,7 +431,9 @@ TEST_F(OptimizeTest, EpochsAreBroughtBackToTheBit) {
   const std::size_t planes = Graph().planes.size();
   ASSERT_GT(planes, 0U);
 
+  STRATA_ASSERT_OK(db().jobs().Start({}, kMapName, "rebuild", {}));  // it has to wait
   STRATA_ASSERT_OK_AND_ASSIGN(const JobInfo undo, db().jobs().Revert({}, kMapName, job.id));
+  EXPECT_THAT(db().jobs().Revert({}, kMapName, job.id), StatusIs(Code::kFailedPrecondition, _));
   ASSERT_EQ(Follow(undo.id).state, JobState::kSucceeded);
   EXPECT_EQ(Digest(), digest);
   ExpectEqual(Poses(), poses);
@@ -574,6 +615,26 @@ TEST_F(OptimizeTest, ADisabledPlaneIsNotUsedButRemembered) {
     EXPECT_EQ(disabled, 1);
   }
   EXPECT_EQ(Optimize({{"planes", "0"}}).metrics.at("planes"), 0.0);
+}
+
+// What the job had found brought it back, and the next job used it.
+TEST_F(OptimizeTest, APlaneThatIsDisabledBeforeAProposalIsAcceptedStaysSo) {
+  MakeWorld();
+  ASSERT_EQ(Optimize().state, JobState::kSucceeded);
+  const JobInfo job = Optimize({{"dry_run", "1"}});
+  const std::vector<GlobalPlane> planes = Graph().planes;
+  ASSERT_THAT(planes, Not(IsEmpty()));
+  const GlobalPlane floor = *std::ranges::max_element(
+      planes, {}, [](const GlobalPlane& plane) { return plane.supports.size(); });
+  STRATA_ASSERT_OK(db().posegraph().EnableConstraint({}, kMapName, floor.id, false));
+  STRATA_ASSERT_OK(db().jobs().Accept({}, kMapName, job.id));
+  ASSERT_EQ(Follow(job.id).state, JobState::kSucceeded);
+  std::vector<GlobalPlane> off = Graph().planes;
+  std::erase_if(off, [](const GlobalPlane& plane) { return plane.enabled; });
+  ASSERT_EQ(off.size(), 1U);
+  EXPECT_GT(off[0].plane.normal.dot(floor.plane.normal), 0.9995);
+  EXPECT_NEAR(off[0].plane.distance, floor.plane.distance, 0.05);
+  EXPECT_EQ(off[0].supports.size(), floor.supports.size());
 }
 
 // A robot may upload in the frame of its base. Taken for seen from the floor itself, some scans saw
