@@ -188,7 +188,13 @@ absl::Status EngineScans::List(const api::Call& call,
           STRATA_ASSIGN_OR_RETURN(page, std::move(read));
           return absl::OkStatus();
         }));
-    for (const PosedScan& scan : page) STRATA_RETURN_IF_ERROR(sink(ToScanInfo(scan)));
+    for (PosedScan& posed : page) {
+      // It came into the map in a later epoch than the one listed, in which it waits.
+      if (posed.scan.state == ScanState::kIntegrated && !posed.pose.has_value()) {
+        posed.scan.state = ScanState::kPending;
+      }
+      STRATA_RETURN_IF_ERROR(sink(ToScanInfo(posed)));
+    }
     if (page.size() < query.limit) return damaged;
     query.after = page.back().scan.number;
   }
@@ -199,16 +205,26 @@ absl::Status EngineScans::GetPoints(const api::Call& call,
                                     const ScanId& id,
                                     absl::FunctionRef<absl::Status(const PointCloud&)> sink) {
   STRATA_ASSIGN_OR_RETURN(const MapReading found, maps_.FindToRead(call, map));
-  STRATA_ASSIGN_OR_RETURN(const PosedScan posed, FindScan(found, call.stop, id));
+  STRATA_ASSIGN_OR_RETURN(PosedScan posed, FindScan(found, call.stop, id));
   const std::string what = absl::StrCat("scan ", id.ToString());
   if (!posed.scan.has_points) return WithoutPoints(found, what);
-  ScanLabels labels(posed.scan, {});
+  std::optional<ScanLabels> labels;  // all as of one moment, however long the points take
+  STRATA_RETURN_IF_ERROR(
+      found.ReadState([&](StorageReader& reader, const MapClock& clock) -> absl::Status {
+        STRATA_ASSIGN_OR_RETURN(posed, reader.GetScan(posed.scan.number, clock.epoch));
+        labels.emplace(posed.scan, LabelView());
+        return Annotate(labels->Hold(reader), what);
+      }));
   for (std::uint32_t ordinal = 0; ordinal < posed.scan.chunks; ++ordinal) {
     STRATA_RETURN_IF_ERROR(call.stop.status());
-    const absl::StatusOr<PointCloud> piece = ReadPiece(found, posed.scan, ordinal, labels);
+    const absl::StatusOr<PointCloud> piece = ReadPiece(found, posed.scan, ordinal, *labels);
     if (!piece.ok()) {
       // Deleted or dropped while we were reading?
       STRATA_ASSIGN_OR_RETURN(const PosedScan now, FindScan(found, call.stop, id));
+      if (now.scan.number != posed.scan.number) {
+        return absl::AbortedError(
+            absl::StrCat(what, " was deleted and sent anew meanwhile; ask again"));
+      }
       if (!now.scan.has_points)
         return absl::FailedPreconditionError(absl::StrCat(what, ": points dropped"));
       return Annotate(piece.status(), absl::StrCat(what, ", piece ", ordinal));

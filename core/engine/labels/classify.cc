@@ -66,7 +66,11 @@ class ScanClassifier {
       ++without_points_;
       return absl::OkStatus();
     }
-    if (damaged_.LeaveOut(scan.number, scan.header.id.ToString(), done)) return absl::OkStatus();
+    if (absl::IsDataLoss(done)) {
+      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_.Reader());
+      damaged_.LeaveOut(*reader, scan.number, scan.header.id.ToString(), done);
+      return absl::OkStatus();
+    }
     if (done.ok()) ++labelled_;
     return done;
   }

@@ -62,6 +62,15 @@ absl::Status ForEachUprightPart(MapCore& core,
   });
 }
 
+absl::Status LabelledScans::Visit(std::size_t k,
+                                  absl::FunctionRef<absl::Status(const PointCloud&)> use) const {
+  const absl::Status done = ForEachUprightPart(*core_, scans_[k], use);
+  if (!absl::IsDataLoss(done)) return done;
+  STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core_->Reader());
+  STRATA_ASSIGN_OR_RETURN(const bool there, IsThere(*reader, scans_[k].number, 0));
+  return there ? done : absl::OkStatus();
+}
+
 std::vector<std::size_t> LabelledScans::Regions(double edge_m) const {
   if (edge_m > 0.0) return RegionsOf(places_, edge_m);
   std::vector<std::size_t> each(scans_.size());
@@ -80,7 +89,11 @@ absl::StatusOr<LabelledScans> LabelledScans::Read(MapCore& core,
         static_cast<double>(i) / static_cast<double>(candidates.size()), "reading labels"));
     const ScanRecord& scan = candidates[i].scan;
     const absl::StatusOr<ClassCounts> more = CountClasses(core, scan);
-    if (damaged.LeaveOut(scan.number, scan.header.id.ToString(), more.status())) continue;
+    if (absl::IsDataLoss(more.status())) {
+      STRATA_ASSIGN_OR_RETURN(const ReaderPool::Lease reader, core.Reader());
+      damaged.LeaveOut(*reader, scan.number, scan.header.id.ToString(), more.status());
+      continue;
+    }
     STRATA_RETURN_IF_ERROR(more.status());
     if (more->empty()) continue;
     labelled.scans_.push_back(scan);

@@ -39,10 +39,8 @@ class LabelledScans {
   std::uint64_t points() const { return points_; }  // labelled ones
   // Which square of `edge_m` every scan was taken in (RegionsOf); 0: each scan is a region.
   std::vector<std::size_t> Regions(double edge_m) const;
-  // Hands on scan `k`, as a CloudSource does.
-  absl::Status Visit(std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) const {
-    return ForEachUprightPart(*core_, scans_[k], use);
-  }
+  // Hands on scan `k`, as a CloudSource does; nothing, or no more, of one that was deleted.
+  absl::Status Visit(std::size_t k, absl::FunctionRef<absl::Status(const PointCloud&)> use) const;
 
  private:
   explicit LabelledScans(MapCore& core) : core_(&core) {}

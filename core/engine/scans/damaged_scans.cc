@@ -18,9 +18,20 @@ bool DamagedScans::LeaveOut(ScanNumber scan, const std::string& name, const absl
   return true;
 }
 
+bool DamagedScans::LeaveOut(StorageReader& reader,
+                            ScanNumber scan,
+                            const std::string& name,
+                            const absl::Status& status) {
+  if (!absl::IsDataLoss(status)) return false;
+  if (!absl::IsNotFound(reader.GetScan(scan, 0).status())) return LeaveOut(scan, name, status);
+  absl::MutexLock lock(&mutex_);
+  deleted_.insert(scan);
+  return true;
+}
+
 std::set<ScanNumber> DamagedScans::Scans() const {
   absl::MutexLock lock(&mutex_);
-  std::set<ScanNumber> numbers;
+  std::set<ScanNumber> numbers = deleted_;
   for (const auto& [scan, damage] : scans_) numbers.insert(scan);
   return numbers;
 }

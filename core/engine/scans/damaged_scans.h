@@ -26,7 +26,13 @@ class DamagedScans {
   // scan's id, or what its row is called where the id cannot be trusted.
   bool LeaveOut(ScanNumber scan, const std::string& name, const absl::Status& status);
 
-  std::set<ScanNumber> Scans() const;
+  // The same, of a scan that was deleted while the job ran: it is left out, and no damage.
+  bool LeaveOut(StorageReader& reader,
+                ScanNumber scan,
+                const std::string& name,
+                const absl::Status& status);
+
+  std::set<ScanNumber> Scans() const;  // deleted ones, too
   // Metrics: `left_out`, how many, and `left_out.<name>` for each.
   void SetMetrics(JobContext& context) const;
   // For people, to append to a message: the first names, what is wrong with them, and the cure;
@@ -40,6 +46,7 @@ class DamagedScans {
   };
   mutable absl::Mutex mutex_;
   std::map<ScanNumber, Damage> scans_ ABSL_GUARDED_BY(mutex_);
+  std::set<ScanNumber> deleted_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace strata

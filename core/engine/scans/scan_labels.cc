@@ -13,6 +13,12 @@
 namespace strata {
 namespace {
 
+absl::StatusOr<std::vector<std::uint16_t>> Decode(const std::string& bytes, std::uint32_t piece) {
+  absl::StatusOr<std::vector<std::uint16_t>> labels = DecodeLabels(bytes);
+  if (labels.ok()) return labels;
+  return Annotate(labels.status(), absl::StrCat("labels, piece ", piece));
+}
+
 // nullopt where there is no such piece.
 absl::StatusOr<std::optional<std::vector<std::uint16_t>>> ReadPiece(StorageReader& reader,
                                                                     ScanNumber scan,
@@ -22,9 +28,8 @@ absl::StatusOr<std::optional<std::vector<std::uint16_t>>> ReadPiece(StorageReade
   STRATA_ASSIGN_OR_RETURN(const std::optional<std::string> bytes,
                           reader.FindLabels(scan, origin, piece));
   if (!bytes.has_value()) return Piece();
-  absl::StatusOr<std::vector<std::uint16_t>> labels = DecodeLabels(*bytes);
-  if (!labels.ok()) return Annotate(labels.status(), absl::StrCat("labels, piece ", piece));
-  return Piece(*std::move(labels));
+  STRATA_ASSIGN_OR_RETURN(std::vector<std::uint16_t> labels, Decode(*bytes, piece));
+  return Piece(std::move(labels));
 }
 
 }  // namespace
@@ -80,16 +85,40 @@ ScanLabels::ScanLabels(const ScanRecord& scan, const LabelView& view)
   changed.change = view.change;
 }
 
+absl::Status ScanLabels::Hold(StorageReader& reader) {
+  for (Column* const column : {&person_, &model_, &faded_}) {
+    if (!column->wanted || column->change != nullptr) continue;
+    std::vector<std::string>& stored = column->stored.emplace();
+    while (true) {
+      STRATA_ASSIGN_OR_RETURN(
+          std::optional<std::string> bytes,
+          reader.FindLabels(scan_, column->origin, static_cast<std::uint32_t>(stored.size())));
+      if (!bytes.has_value()) break;
+      stored.push_back(*std::move(bytes));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<std::uint16_t>> ScanLabels::NextPiece(StorageReader& reader,
+                                                                 Column& column) const {
+  const std::uint32_t piece = column.next_piece++;
+  if (!column.stored.has_value()) {
+    STRATA_ASSIGN_OR_RETURN(auto read, ReadPiece(reader, scan_, column.origin, piece));
+    return std::move(read).value_or(std::vector<std::uint16_t>());
+  }
+  if (piece >= column.stored->size()) return std::vector<std::uint16_t>();
+  return Decode((*column.stored)[piece], piece);
+}
+
 absl::StatusOr<std::uint16_t> ScanLabels::Next(StorageReader& reader, Column& column) const {
   if (column.change != nullptr) {
     const std::vector<std::uint16_t>& labels = column.change->labels;
     return column.used < labels.size() ? labels[column.used++] : std::uint16_t{0};
   }
   if (column.used == column.held.size()) {
-    STRATA_ASSIGN_OR_RETURN(auto piece,
-                            ReadPiece(reader, scan_, column.origin, column.next_piece++));
+    STRATA_ASSIGN_OR_RETURN(column.held, NextPiece(reader, column));
     column.used = 0;
-    column.held = std::move(piece).value_or(std::vector<std::uint16_t>());
     if (column.held.empty()) {
       column.held.assign(kMaxEncodedLabels, 0);
     }

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,10 @@ class ScanLabels {
   // `view.change`, if any, must outlive it.
   ScanLabels(const ScanRecord& scan, const LabelView& view);
 
+  // What is stored of its labels now is what the pieces get, whatever is stored later. They stay
+  // encoded. DATA_LOSS.
+  absl::Status Hold(StorageReader& reader);
+
   // The next piece in order: its label column becomes the one that counts; empty if the scan has no
   // label at all. DATA_LOSS naming the labels that are damaged.
   absl::Status Apply(StorageReader& reader, PointCloud& piece);
@@ -60,12 +65,15 @@ class ScanLabels {
   struct Column {
     bool wanted = false;
     LabelOrigin origin = LabelOrigin::kPerson;
-    const LabelChange* change = nullptr;  // instead of what is stored
+    const LabelChange* change = nullptr;                            // instead of what is stored
+    std::optional<std::vector<std::string>> stored = std::nullopt;  // instead of what is stored now
     std::uint32_t next_piece = 0;
     std::vector<std::uint16_t> held;
     std::size_t used = 0;  // of `held`
   };
 
+  // Empty beyond what is stored.
+  absl::StatusOr<std::vector<std::uint16_t>> NextPiece(StorageReader& reader, Column& column) const;
   // The next label of the column; 0 beyond what is stored.
   absl::StatusOr<std::uint16_t> Next(StorageReader& reader, Column& column) const;
 

@@ -47,8 +47,14 @@ ScanViews::ScanViews(ScanAccess access, std::vector<ScanRecord> scans, DamagedSc
       features_(access_.caches()) {}
 
 void ScanViews::Remember(std::size_t node, const absl::Status& status) {
-  if (damaged_ == nullptr) return;
-  damaged_->LeaveOut(scans_[node].number, scans_[node].header.id.ToString(), status);
+  if (damaged_ == nullptr || !absl::IsDataLoss(status)) return;
+  const ScanRecord& scan = scans_[node];
+  const absl::StatusOr<MapState::Loan> reader = access_.Reader();
+  if (reader.ok()) {
+    damaged_->LeaveOut(**reader, scan.number, scan.header.id.ToString(), status);
+  } else {
+    damaged_->LeaveOut(scan.number, scan.header.id.ToString(), status);
+  }
 }
 
 absl::StatusOr<std::shared_ptr<const ScanFeatures>> ScanViews::MakeFeatures(

@@ -12,6 +12,7 @@
 
 #include "core/codec/surface_tile_codec.h"
 #include "core/common/retry_delay.h"
+#include "core/common/status.h"
 #include "tests/core/engine/engine_fixture.h"
 #include "tests/support/status_matchers.h"
 
@@ -76,6 +77,69 @@ TEST_F(EngineScansTest, DeleteEqualsNeverUploaded) {
   EXPECT_THAT(db().scans().Delete({}, kMapName, {"run", 9}),
               StatusIs(absl::StatusCode::kNotFound, HasSubstr("run/9")));
   ExpectSound();
+}
+
+// Of a download that other calls come into the middle of.
+TEST_F(EngineScansTest, PointsAreOfOneScanAndItsLabelsOfOneMoment) {
+  MakeMap();
+  PointCloud cloud = SeeWorld(Pose::Identity(), 1, 200'000);
+  while (cloud.size() < 200'000) cloud.points.push_back(cloud.points[cloud.size() % 1000]);
+  const ScanId id{"run", 1};
+  const auto send = [&] {
+    STRATA_ASSERT_OK(Upload(db(), HeaderOf(id, cloud, Pose::Identity()), cloud, 20'000));
+  };
+  send();
+  WaitIntegrated(db());
+  const auto label = [&](std::uint16_t with) {
+    return db().scans().SetLabels(
+        {}, kMapName, id, std::vector<std::uint16_t>(cloud.size(), with), api::LabelMode::kReplace);
+  };
+  STRATA_ASSERT_OK(label(1));
+  std::size_t pieces = 0;
+  std::vector<std::uint16_t> labels;
+  STRATA_ASSERT_OK(db().scans().GetPoints({}, kMapName, id, [&](const PointCloud& piece) {
+    labels.insert(labels.end(), piece.label.begin(), piece.label.end());
+    return pieces++ == 0 ? label(2) : absl::OkStatus();
+  }));
+  ASSERT_GT(pieces, 1U);
+  EXPECT_EQ(labels.size(), cloud.size());
+  EXPECT_THAT(labels, ::testing::Each(1));
+  pieces = 0;
+  EXPECT_THAT(db().scans().GetPoints({},
+                                     kMapName,
+                                     id,
+                                     [&](const PointCloud&) -> absl::Status {
+                                       if (pieces++ > 0) return absl::OkStatus();
+                                       const absl::Status deleted =
+                                           db().scans().Delete({}, kMapName, id);
+                                       send();
+                                       return deleted;
+                                     }),
+              StatusIs(absl::StatusCode::kAborted, HasSubstr("sent anew")));
+}
+
+// A listing is of one epoch: what came into the map in a later one waits in it.
+TEST_F(EngineScansTest, NoScanIsListedAsIntegratedWithoutItsPose) {
+  constexpr std::uint64_t kMany = 300;  // more than a page
+  MakeMap();
+  UploadRooms(kMany);
+  WaitIntegrated(db());
+  std::uint64_t seen = 0;
+  STRATA_ASSERT_OK(db().scans().List({}, kMapName, {}, [&](const ScanInfo& scan) -> absl::Status {
+    if (++seen == 1) {
+      STRATA_RETURN_IF_ERROR(db().posegraph().SetPose({}, kMapName, {"run", 1}, PoseAt(0.5, 0.5)));
+      UploadRoom(kMany + 1, RoomPose(2));
+      WaitIntegrated(db());
+    }
+    if (scan.header.id.sequence == kMany + 1) {
+      EXPECT_EQ(scan.state, ScanState::kPending);
+    }
+    return absl::OkStatus();
+  }));
+  EXPECT_EQ(seen, kMany + 1);
+  STRATA_ASSERT_OK_AND_ASSIGN(const ScanInfo now,
+                              db().scans().Get({}, kMapName, {"run", kMany + 1}));
+  EXPECT_EQ(now.state, ScanState::kIntegrated);
 }
 
 TEST_F(EngineScansTest, ManyRobotsAtOnce) {
