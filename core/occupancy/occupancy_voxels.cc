@@ -140,7 +140,7 @@ absl::Status OccupancyVoxels::Add(const PointCloud& cloud,
     if (std::max(ray.from.cwiseAbs().maxCoeff(), ray.to.cwiseAbs().maxCoeff()) >= farthest_voxel_) {
       return absl::OutOfRangeError(absl::StrFormat(
           "occupancy: a ray from (%.1f, %.1f, %.1f) leaves the %.1f m around 0 that voxels of "
-          "%g m reach; take larger ones",
+          "%g m reach; take larger ones or a region near 0",
           from.x() * voxel_m_,
           from.y() * voxel_m_,
           from.z() * voxel_m_,

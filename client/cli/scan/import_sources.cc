@@ -139,6 +139,7 @@ bool Differs(const ScanFile& scan, const ScanHeader& there) {
 
 // Scans without poses and times are told apart by the points of the first one.
 bool HasOtherPoints(const ScanFile& scan, const ScanHeader& there) {
+  if (there.point_count == 0) return false;  // sent as a local map, without points
   const absl::StatusOr<PointCloud> cloud = ReadScanFile(scan);
   return cloud.ok() && cloud->size() != there.point_count;
 }
