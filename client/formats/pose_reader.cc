@@ -1,5 +1,6 @@
 #include "client/formats/pose_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,8 +13,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "absl/time/time.h"
 #include <Eigen/Geometry>
 
@@ -115,14 +119,33 @@ absl::StatusOr<NamedFormat> Choose(const TextCursor& cursor,
       absl::StrCat("expected 8 (tum), 9 (index-tum) or 12 (kitti) numbers, found ", numbers));
 }
 
+// A line that names the columns, or a comment, which may: some programs put w first.
+absl::Status CheckHeading(const TextCursor& cursor, const std::vector<absl::string_view>& words) {
+  const auto place = [&words](absl::string_view name) {
+    return std::ranges::find_if(words, [name](absl::string_view word) {
+      return absl::StrReplaceAll(absl::AsciiStrToLower(word), {{"_", ""}, {"#", ""}}) == name;
+    });
+  };
+  const auto qw = place("qw");
+  const auto qx = place("qx");
+  if (qx == words.end() || qw > qx) return absl::OkStatus();
+  return cursor.Error("columns qw qx qy qz; expected qx qy qz qw: write w last");
+}
+
 absl::StatusOr<PoseList> Parse(absl::string_view text, PoseFormat asked) {
-  TextCursor cursor(text);
+  TextCursor cursor(absl::StripPrefix(text, "\xef\xbb\xbf"));  // of UTF-8
   std::optional<NamedFormat> format;
   PoseList list;
   std::set<std::uint64_t> seen;
   while (const std::optional<absl::string_view> line = cursor.NextLine()) {
     const std::vector<absl::string_view> words = SplitWords(*line, true);
-    if (words.empty() || words[0][0] == '#') continue;
+    if (words.empty()) continue;
+    const bool is_heading = !format.has_value() && !ParseNumber(words[0]).has_value() &&
+                            absl::ascii_isalpha(words[0][0]);
+    if (words[0][0] == '#' || is_heading) {
+      STRATA_RETURN_IF_ERROR(CheckHeading(cursor, words));
+      continue;
+    }
     STRATA_ASSIGN_OR_RETURN(const std::vector<double> numbers, LineNumbers(cursor, words));
     if (!format.has_value()) {
       STRATA_ASSIGN_OR_RETURN(format, Choose(cursor, asked, numbers.size()));

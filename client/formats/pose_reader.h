@@ -19,7 +19,8 @@ namespace strata {
 // kTum: "time x y z qx qy qz qw". kIndexTum: "index time x y z qx qy qz qw". kKitti: the 12 numbers
 // of [R t] row by row; the line's number, from 0, is the index. k3dtk: no file of poses, but a
 // .pose file beside each scan. Metres, seconds; blanks, tabs or commas separate; '#' begins a
-// comment line.
+// comment line; names of columns may stand above the poses, and neither may say that qw comes
+// first.
 enum class PoseFormat : std::uint8_t { kAuto, kTum, kIndexTum, kKitti, k3dtk };
 
 // "auto", "tum", "index-tum", "kitti", "3dtk"; INVALID_ARGUMENT listing them otherwise.

@@ -54,6 +54,21 @@ TEST_F(PoseReaderTest, KittiLinesCountFromZero) {
   EXPECT_LT((ahead - Eigen::Vector3d(1, 3, 3)).norm(), 1e-9);
 }
 
+TEST_F(PoseReaderTest, ColumnsMayBeNamed) {
+  STRATA_ASSERT_OK_AND_ASSIGN(const PoseList list,
+                              Read("\xef\xbb\xbftime,x,y,z,qx,qy,qz,qw\r\n1.5,1,2,3,0,0,0,1\r\n"));
+  ASSERT_EQ(list.poses.size(), 1U);
+  EXPECT_EQ(list.poses[0].T_map_scan.translation().z(), 3.0);
+  for (const char* names :
+       {"timestamp tx ty tz qw qx qy qz\n", "# time, x, y, z, q_w, q_x, q_y, q_z\n"}) {
+    EXPECT_THAT(Read(std::string(names) + "1 2 3 4 1 0 0 0\n"),
+                StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("write w last")))
+        << names;
+  }
+  EXPECT_THAT(Read("1 1 2 3 0 0 0 1\nthen 1 2 3 0 0 0 1\n"),
+              StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr("found 'then'")));
+}
+
 TEST_F(PoseReaderTest, ErrorsNameFileLineAndWhatWasExpected) {
   const auto expect = [this](const std::string& text, const std::string& message) {
     EXPECT_THAT(Read(text), StatusIs(absl::StatusCode::kInvalidArgument, HasSubstr(message)));
