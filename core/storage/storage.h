@@ -87,8 +87,10 @@ class StorageReader {
   virtual absl::StatusOr<std::vector<PlaneRecord>> ListPlanes(std::uint64_t epoch) = 0;
   // What a job has proposed, by scan; empty when nothing is.
   virtual absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) = 0;
-  // Newest first; the newest is the current one.
+  // Newest first; the newest is the current one. Looks at all poses: `decided` counts them.
   virtual absl::StatusOr<std::vector<EpochInfo>> ListEpochs() = 0;
+  // Of it, at no cost: `decided` stays 0. nullopt for one that never was.
+  virtual absl::StatusOr<std::optional<EpochInfo>> FindEpoch(std::uint64_t epoch) = 0;
   virtual absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() = 0;
   // Piece `piece` of a scan's labels; nullopt where there is none.
   virtual absl::StatusOr<std::optional<std::string>> FindLabels(ScanNumber number,

@@ -56,10 +56,8 @@ absl::Status MapWatcher::Fill(StorageReader& reader,
                               api::MapUpdate& update) const {
   STRATA_RETURN_IF_ERROR(CheckSince(reader, update));
   if (epoch_ != 0 && epoch_ != update.epoch) {
-    STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
-    for (const EpochInfo& info : epochs) {
-      if (info.epoch == update.epoch) update.epoch_reason = info.reason;
-    }
+    STRATA_ASSIGN_OR_RETURN(const std::optional<EpochInfo> info, reader.FindEpoch(update.epoch));
+    if (info.has_value()) update.epoch_reason = info->reason;
   }
   if (update.whole) return AddEverything(reader, state, update);
   for (const ScanId& id : state.changes().scans) {

@@ -31,13 +31,11 @@ bool SamePose(const Pose& a, const Pose& b) { return a.matrix() == b.matrix(); }
 }  // namespace
 
 absl::Status CheckEpochKept(StorageReader& reader, std::uint64_t epoch, absl::StatusCode too_old) {
-  STRATA_ASSIGN_OR_RETURN(const std::vector<EpochInfo> epochs, reader.ListEpochs());
-  const auto it = std::find_if(
-      epochs.begin(), epochs.end(), [epoch](const EpochInfo& info) { return info.epoch == epoch; });
-  if (it == epochs.end()) {
+  STRATA_ASSIGN_OR_RETURN(const std::optional<EpochInfo> info, reader.FindEpoch(epoch));
+  if (!info.has_value()) {
     return absl::NotFoundError(absl::StrCat("epoch ", epoch, " does not exist; see map history"));
   }
-  if (it->kept) return absl::OkStatus();
+  if (info->kept) return absl::OkStatus();
   return absl::Status(
       too_old,
       absl::StrCat("epoch ", epoch, " is too old: its poses are not kept; see map history"));

@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -103,6 +104,17 @@ absl::StatusOr<std::vector<EpochInfo>> PostgresReader::ListEpochs() {
   std::vector<EpochInfo> epochs;
   while (row.Next()) epochs.push_back(ReadEpoch(row));
   return epochs;
+}
+
+absl::StatusOr<std::optional<EpochInfo>> PostgresReader::FindEpoch(std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(
+      Rows row,
+      Ask("SELECT e.epoch, e.created_us, e.reason, e.job, 0, m.epoch, m.oldest_epoch FROM "
+          "truth_epoch AS e JOIN truth_map AS m ON m.map = e.map WHERE e.map = $1 AND e.epoch = $2",
+          epoch));
+  std::optional<EpochInfo> found;
+  if (row.Next()) found = ReadEpoch(row);
+  return found;
 }
 
 absl::Status PostgresWriter::PutPose(const PoseRecord& pose) {

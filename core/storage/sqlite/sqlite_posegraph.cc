@@ -1,6 +1,7 @@
 // Truth about poses beyond the poses: constraints, planes, epochs, and what jobs propose.
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -108,6 +109,20 @@ absl::StatusOr<std::vector<EpochInfo>> SqliteReader::ListEpochs() {
     return absl::OkStatus();
   }));
   return epochs;
+}
+
+absl::StatusOr<std::optional<EpochInfo>> SqliteReader::FindEpoch(std::uint64_t epoch) {
+  STRATA_ASSIGN_OR_RETURN(
+      Statement row,
+      database_.Prepare("SELECT e.epoch, e.created_us, e.reason, e.job, 0, m.epoch, m.oldest_epoch "
+                        "FROM truth_epoch AS e, truth_map AS m WHERE m.id = 1 AND e.epoch = ?1"));
+  row.Bind(epoch);
+  std::optional<EpochInfo> found;
+  STRATA_RETURN_IF_ERROR(ForEachRow(row, [&] {
+    found = ReadEpoch(row);
+    return absl::OkStatus();
+  }));
+  return found;
 }
 
 absl::StatusOr<std::uint64_t> SqliteWriter::NextConstraint() {

@@ -44,6 +44,7 @@ class SqliteReader final : public StorageReader {
   absl::StatusOr<std::vector<PlaneRecord>> ListPlanes(std::uint64_t epoch) override;
   absl::StatusOr<std::vector<ProposedPose>> ListProposedPoses(std::uint64_t job) override;
   absl::StatusOr<std::vector<EpochInfo>> ListEpochs() override;
+  absl::StatusOr<std::optional<EpochInfo>> FindEpoch(std::uint64_t epoch) override;
   absl::StatusOr<std::map<std::string, RobotProfile>> ListProfiles() override;
   absl::StatusOr<std::optional<std::string>> FindLabels(ScanNumber number,
                                                         LabelOrigin origin,

@@ -47,6 +47,12 @@ TEST_F(PosegraphContractTest, PoseOfAnEpochIsTheNewestUpToIt) {
   ASSERT_EQ(epochs.size(), 2U);
   EXPECT_EQ(epochs[0].decided, 0U);
   EXPECT_EQ(epochs[1].decided, 1U);
+  STRATA_ASSERT_OK_AND_ASSIGN(const auto found, reader().FindEpoch(2));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->reason, "empty");
+  EXPECT_TRUE(found->current);
+  EXPECT_FALSE(reader().FindEpoch(1)->value().current);
+  EXPECT_FALSE(reader().FindEpoch(3)->has_value());
   EXPECT_EQ(reader().GetScan(number, 9)->scan.header.T_map_scan.translation().x(), 1.1);
 }
 
@@ -225,6 +231,8 @@ TEST_F(PosegraphContractTest, AnEpochComesBackWithItsConstraints) {
   EXPECT_EQ(reader().ListConstraints(5)->size(), 3U);
   EXPECT_FALSE(reader().ListEpochs()->at(2).kept);
   EXPECT_TRUE(reader().ListEpochs()->at(1).kept);
+  EXPECT_FALSE(reader().FindEpoch(4)->value().kept);
+  EXPECT_TRUE(reader().FindEpoch(5)->value().kept);
 }
 
 TEST_F(PosegraphContractTest, ForgottenEpochsKeepWhatLaterOnesUse) {
